@@ -138,6 +138,7 @@ class Header(QFrame):
             spare = self.width() - layout.minimumSize().width()
             if spare >= 0:
                 self._title.setMinimumWidth(min(WHOLE, least + spare))
+                layout.activate()  # else the next picture has the title under a chip
                 return
 
     def render_snapshot(self, snapshot: Snapshot) -> None:

@@ -71,7 +71,10 @@ def heights_of(
             for each in (values, lines, words):
                 del each[gone]
     apart = min(LINE, height - 2 * HALF)
-    if len(words) == 2 and words[0] - words[1] < apart:  # not quite beside their lines
+    if len(words) == 2 and apart <= 2 * HALF:  # there is room for one
+        values, lines, words = values[1:], lines[1:], words[1:]
+    elif len(words) == 2 and words[0] - words[1] < apart:
+        # not quite beside their lines
         top = max(HALF, min((sum(words) - apart) / 2, height - HALF - apart))
         words = [top + apart, top]
     return [

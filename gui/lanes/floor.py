@@ -18,7 +18,7 @@ from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.tokens import LIGHT, Tokens
 from gui.plots.axis import guarded
-from gui.plots.numbers import numbers
+from gui.plots.numbers import decimals, number, numbers
 from tactile_lab.trace import Trace
 
 AXIS = 52
@@ -32,6 +32,12 @@ CLOSE = 3
 
 FLAG = 190
 """Longest text of a note in the lanes, px; the card about the run has all of it."""
+
+LETTERS = 11
+"""Height that a name in a row needs, px."""
+
+BESIDE = 80
+"""Pixels between the cursors from which on their times stand below their lines."""
 
 TIME_AXIS = 22
 """Height of the time axis below the last lane, px."""
@@ -117,7 +123,7 @@ class Background(Layer):
             x = max(frame.x1(source.reach), frame.left)
             ahead = QRectF(x, frame.top, frame.right - x, frame.bottom - frame.top)
             painter.fillRect(ahead, QColor(tokens.ahead))
-        _time_grid(painter, frame, tokens)
+        _time_grid(painter, frame, stage)
         _flags(painter, frame, source.notes, tokens)
         for _, bottom in stage.lanes:
             # above it as much is left free as between a lane and the next
@@ -181,14 +187,49 @@ def _flags(
         painter.fillRect(QRectF(x, frame.top + 17, 4, 12), QColor(tokens.accent))
 
 
-def _time_grid(painter: QPainter, frame: Frame, tokens: Tokens) -> None:
+def time_words(view: TimeView, time: float) -> str:
+    """A time as finely as the view tells it."""
+    step = view.width / 2000
+    return f"{number(time, min(6, max(2, decimals(step))))} s"
+
+
+def cursor_times(view: TimeView, frame: Frame) -> list[tuple[float, str, float]]:
+    """Place of each cursor, px, its time in words, and what part of them stands there.
+
+    Where both are close, one stands left of its line and the other right.
+    """
+    across = [frame.x1(time) for time in view.cursors or ()]
+    close = len(across) == 2 and abs(across[1] - across[0]) < BESIDE
+    sides = [float(x == min(across)) if close else 0.5 for x in across]
+    words = [time_words(view, time) for time in view.cursors or ()]
+    return list(zip(across, words, sides, strict=True))
+
+
+def round_times(view: TimeView, frame: Frame) -> list[tuple[float, str, bool]]:
+    """Place of each round time, px, its number, and whether it has room below.
+
+    It has none before the start, at the right end, and where a cursor's time stands.
+    """
+    taken = []
+    for x, words, side in cursor_times(view, frame):
+        wide = paint.width_of(words) + 6
+        if frame.left <= x <= frame.right:
+            taken.append((x - side * wide, x + (1 - side) * wide))
+    found = []
     most = max(2, int((frame.right - frame.left) / 90))
-    found = numbers(frame.start, frame.end, most)
-    across = [round(frame.x1(value)) + 0.5 for value, _ in found]
+    for value, words in numbers(frame.start, frame.end, most):
+        x, half = round(frame.x1(value)) + 0.5, paint.width_of(words) / 2
+        free = all(x + half < left or x - half > right for left, right in taken)
+        found.append((x, words, free and value >= -1e-12 and x < frame.right - 14))
+    return found
+
+
+def _time_grid(painter: QPainter, frame: Frame, stage: LaneContext) -> None:
+    tokens, found = stage.tokens, round_times(stage.view, frame)
     painter.setPen(paint.pen(tokens.grid))
-    painter.drawLines([QLineF(x, frame.top, x, frame.bottom) for x in across])
-    for (value, words), x in zip(found, across, strict=True):
-        if value >= -1e-12 and x < frame.right - 14:
+    painter.drawLines([QLineF(x, frame.top, x, frame.bottom) for x, _, _ in found])
+    for x, words, told in found:
+        if told:
             at = QPointF(x, frame.bottom + 11)
             paint.write(painter, at, words, tokens.muted, align=0.5)
     painter.setPen(paint.pen(tokens.border_strong))
@@ -205,7 +246,12 @@ def row_names(
     names: Sequence[str],
     colours: Sequence[str] = (),
 ) -> None:
-    """Write the names of the rows of a raster or a stack beside them."""
+    """Write the names of the rows of a raster or a stack beside them.
+
+    In a lane so low that they would lie over each other there are none.
+    """
+    if frame.bottom - frame.top < LETTERS * len(names):
+        return
     for number_, (a, b) in enumerate(rows_of(frame, len(names))):
         colour = colours[number_] if colours else tokens.muted
         at = QPointF(frame.left - 8, (a + b) / 2)

@@ -339,12 +339,17 @@ def write(
     painter.drawStaticText(where, laid_out)
 
 
+def width_of(text: str) -> float:
+    """Width of a text as `write` has it, px."""
+    return _laid_out(text, 11)[1]
+
+
 def shortened(text: str, room: float) -> str:
     """What of a text as `write` has it is shown in so many px; "" for nothing.
 
     A name that just ended at a border would read as another: 160 mN as 160 m.
     """
-    if _laid_out(text, 11)[1] <= room:
+    if width_of(text) <= room:
         return text
     cut = QFontMetricsF(sized(11)).elidedText(text, Qt.TextElideMode.ElideRight, room)
     return cut if len(cut) > 1 else ""
@@ -359,7 +364,7 @@ def write_on(
     align: float = 0.0,
 ) -> None:
     """Write as `write` does, on a ground of its own: to be read over anything."""
-    _, wide, _ = _laid_out(text, 11)
+    wide = width_of(text)
     box = QRectF(at.x() - align * wide - 3, at.y() - 8, wide + 6, 16)
     painter.fillRect(box, QColor(ground))
     write(painter, at, text, colour, align=align)

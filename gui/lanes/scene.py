@@ -26,21 +26,20 @@ from gui.lanes.floor import (
     Background,
     LaneContext,
     Layer,
+    cursor_times,
     hold_names,
     note_texts,
+    time_words,
 )
 from gui.lanes.paint import Frame
 from gui.lanes.readings import values_at
 from gui.look.fonts import sized
 from gui.look.tokens import Tokens
 from gui.plots.axis import guarded
-from gui.plots.numbers import decimals, number
+from gui.plots.numbers import number
 
 GRAB = 5
 """Pixels within which a cursor is grabbed."""
-
-BESIDE = 80
-"""Pixels between the cursors from which on their times stand below their lines."""
 
 LEAST_BOX = 10
 """Height from which on a zoom box is meant for the values, too, px."""
@@ -97,11 +96,10 @@ class Marks(Layer):
 
     def _cursors(self, painter: QPainter, frame: Frame) -> None:
         """A and B, with their names above and their times below."""
-        tokens, cursors = self._stage.tokens, self._stage.view.cursors or ()
-        across = [frame.x1(time) for time in cursors]
-        close = len(across) == 2 and abs(across[1] - across[0]) < BESIDE
+        tokens = self._stage.tokens
         colours = tokens.accent, tokens.V_C1
-        for name, time, x, colour in zip("AB", cursors, across, colours, strict=False):
+        told = cursor_times(self._stage.view, frame)
+        for name, (x, words, side), colour in zip("AB", told, colours, strict=False):
             if not frame.left <= x <= frame.right:
                 continue
             self._upright(painter, x, paint.pen(colour, Qt.PenStyle.DashLine))
@@ -111,13 +109,7 @@ class Marks(Layer):
             painter.setPen(QColor(tokens.on_accent))
             painter.setFont(sized(11, QFont.Weight.Bold))
             painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
-            side = float(x == min(across)) if close else 0.5
-            self._tell(painter, QPointF(x, frame.bottom + 11), self._time(time), side)
-
-    def _time(self, time: float) -> str:
-        """A time as finely as the view tells it."""
-        step = self._stage.view.width / 2000
-        return f"{number(time, min(6, max(2, decimals(step))))} s"
+            self._tell(painter, QPointF(x, frame.bottom + 11), words, side)
 
     def _cross(self, painter: QPainter, at: QPointF) -> None:
         """Time and value under the pointer, and every lane's value at that time."""
@@ -127,7 +119,7 @@ class Marks(Layer):
         pen = paint.pen(tokens.faint, Qt.PenStyle.DotLine)
         self._upright(painter, at.x(), pen)
         foot = QPointF(at.x(), frame.bottom + 11)
-        self._tell(painter, foot, self._time(time), 0.5)
+        self._tell(painter, foot, time_words(view, time), 0.5)
         for box in self.boxes:
             place, lane = box.geometry(), box.lane
             inside = place.top() <= at.y() <= place.bottom()

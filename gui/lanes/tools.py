@@ -27,6 +27,17 @@ The same with cursors and without: no button moves away under the pointer.
 """
 
 
+class _ReadOut(QLabel):
+    """Says as much of the cursors as there is room for: buttons come and go beside."""
+
+    resized = Signal()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Tell that there is more room, or less."""
+        super().resizeEvent(event)
+        self.resized.emit()
+
+
 class Tools(QWidget):
     """Buttons that change the view, and the cursors' times as text."""
 
@@ -55,7 +66,7 @@ class Tools(QWidget):
         self.lanes = IconButton(theme, "layers", "Choose lanes (L)")
         self.export = IconButton(theme, "export", "Export this view (Ctrl+E)")
         self.help = IconButton(theme, "help", "Help on the lanes (F1 from a lane)")
-        self.readout = QLabel()
+        self.readout = _ReadOut()
         self._lay_out()
         self._connect()
 
@@ -71,9 +82,8 @@ class Tools(QWidget):
             button.set_wide(wide)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Say as much of the cursors as there is room for."""
+        """Leave out what there is no room for."""
         super().resizeEvent(event)
-        self.show_cursors()
         self._leave_out()
 
     def _leave_out(self) -> None:
@@ -132,6 +142,7 @@ class Tools(QWidget):
         self.export.clicked.connect(self.export_asked)
         self._stack.export_asked.connect(self.export_asked)
         self._view.cursors_changed.connect(self.show_cursors)
+        self.readout.resized.connect(self.show_cursors)
         self.follow.setChecked(True)
         self.widths.choose(1)
         self.twin.setChecked(True)

@@ -10,12 +10,13 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from gui.lanes.box import heights_of
-from gui.lanes.floor import AXIS
+from gui.lanes.floor import AXIS, cursor_times, round_times
 from gui.lanes.lane import lanes_for
 from gui.lanes.live import LiveSource
-from gui.lanes.paint import shortened
+from gui.lanes.paint import Frame, shortened, width_of
 from gui.lanes.stack import LaneStack
 from gui.lanes.tools import Tools
+from gui.lanes.view import TimeView
 from gui.look.theme import Theme
 from gui.parts import IconButton
 
@@ -54,6 +55,31 @@ def test_a_low_axis_tells_two_heights_and_a_high_one_not_too_many(low, high, hei
     assert all(abs(line - told) <= 7 for _, line, told in found)
     heights = [told for _, _, told in found]
     assert min(b - a for b, a in pairwise(heights)) >= 11, "none lies over another"
+
+
+@pytest.mark.parametrize(("low", "high"), [(-60, 60), (-0.5, 7)])
+def test_an_axis_lower_than_two_numbers_has_one(low, high):
+    """Below a banner on a small screen, 50 stood on -50."""
+    ((words, _, told),) = heights_of(low, high, 15)
+    assert words in ("50", "5") and 4 <= told <= 11
+
+
+@pytest.mark.parametrize(("a", "b"), [(6.4, 12.0), (5.2, 5.9), (6.0, 6.1), (0.1, 30.0)])
+def test_no_round_time_stands_half_below_that_of_a_cursor(app, a, b):
+    view = TimeView()
+    view.set_now(20.0, 20.0)
+    view.show_span(0.0, 20.0)
+    view.place_cursors(a, b)
+    frame = Frame(0.0, 1200.0, 0.0, 100.0, view.start, view.end, 0.0, 1.0)
+    times = round_times(view, frame)
+    whole = [x for x, _, told in times if told]
+    seen = [
+        (x - side * width_of(words), x + (1 - side) * width_of(words))
+        for x, words, side in cursor_times(view, frame)
+        if x <= frame.right
+    ]
+    assert len(times) > 5 and 3 <= len(whole) < len(times)
+    assert all(not left <= x <= right for x in whole for left, right in seen)
 
 
 def test_a_name_that_is_cut_off_shows_that_it_is(app) -> None:

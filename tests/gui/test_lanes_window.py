@@ -29,7 +29,8 @@ def test_lanes_keep_their_view_there_and_back(lab) -> None:
     centre.view.show_span(0.25, 0.5)
     centre.view.place_cursors(0.3, 0.5)
     looked = centre.view.start, centre.view.width, centre.view.cursors
-    sizes = centre.splitter.sizes()
+    sizes, readout = centre.splitter.sizes(), centre.tools.readout
+    assert "A&nbsp;" in readout.text()
     window.part_lanes()
     assert centre.lanes.window() is window.apart and window.apart.isVisible()
     assert (centre.view.start, centre.view.width, centre.view.cursors) == looked
@@ -37,6 +38,8 @@ def test_lanes_keep_their_view_there_and_back(lab) -> None:
     assert window.apart is None
     assert centre.lanes.window() is window and centre.splitter.sizes() == sizes
     assert (centre.view.start, centre.view.width, centre.view.cursors) == looked
+    lab.app.processEvents()
+    assert "A&nbsp;" in readout.text(), "there is as much room as before"
     centre.view.clear_cursors()
     centre.view.show_all()
 
