@@ -29,6 +29,8 @@ PANEL, SMALL = 200, 130
 """Height of a panel, and of one that is low in the report, px."""
 LEFT, FOOT, LOW, HEAD = 48, 36, 20, 22
 """Width of an axis; heights of one with its name, without it, and of a heading, px."""
+LINE = 15
+"""Height of a line of text below a panel, px."""
 AIR = 6
 """Height above a plot without a heading, for the number at the end of its axis, px."""
 NEAR = 0.04
@@ -262,7 +264,9 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
             self._guide(guide)
         for series in panel.series:
             self._series(series)
-        if panel.text:
+        if panel.text.count("\n") > 1:  # of so many lines, they would lie over the data
+            self.addItem(_Heading(_rich(panel.text, tokens.text)), 3, 0, 1, 2)
+        elif panel.text:
             words = pg.LabelItem(_rich(panel.text), color=tokens.text, size="11px")
             words.setParentItem(self.box)
             at = (1, 0) if panel.corner == "upper" else (1, 1)
@@ -462,6 +466,8 @@ def _shown(by: float, log: bool) -> Callable[[ArrayLike], FloatArray]:
 def _heights(plot: Plot) -> list[int]:
     """Of the panels, px; those with numbers along x are higher."""
     high = [PANEL if panel.height > 1.7 else SMALL for panel in plot.panels]
+    texts = [panel.text.count("\n") + 1 for panel in plot.panels]
+    high = [h + LINE * (n if n > 2 else 0) for h, n in zip(high, texts, strict=True)]
     last = len(high) - 1
     return [h + FOOT * (plot.beside or i == last) for i, h in enumerate(high)]
 
@@ -479,7 +485,9 @@ def _range(values: list[FloatArray], whole: bool) -> list[float]:
     low, high = float(found.min()), float(found.max())
     if whole:
         return [low - 0.5, high + 0.5]
-    return [*nice_range(low, high, max(1e-9, 1e-6 * abs(high)))]
+    # one value, but for rounding, stands in a range of a tenth of it
+    share = 0.1 if high - low <= 1e-6 * abs(high) else 0.0
+    return [*nice_range(low, high, max(1e-9, share * abs(high)))]
 
 
 def _pieces(x: FloatArray, y: FloatArray) -> Iterator[slice]:

@@ -44,6 +44,38 @@ def rates(top: float) -> Plot:
     return Plot(name="rates", caption="", x_label="force", x_unit="N", panels=(panel,))
 
 
+def test_one_value_but_for_rounding_has_an_axis_that_can_be_read(app) -> None:
+    """Twelve touches of 160 mN stood at 159.99995, 160.00000 and 160.00005."""
+    force = (0.16, 0.16 * (1 + 1e-9), 0.16)
+    panel = Panel(label="rate", unit="Hz", series=(Series(x=force, y=[9, 8, 7]),))
+    plot = Plot(name="one", caption="", x_label="F", x_unit="N", panels=(panel,))
+    view = SmallPlot(Theme("light"))
+    view.show_plot(plot)
+    left, right = view.panels[0].box.whole[0]
+    assert 10 < right - left < 30 and left < 160 < right
+
+
+def test_a_text_of_many_lines_stands_below_its_plot(app) -> None:
+    """Five fitted values stood over the data they are of."""
+    lines = "\n".join(f"line {k}" for k in range(5))
+    curve = (Series(x=[0, 1], y=[1, 0]),)
+    heights = []
+    for text in ("", lines):
+        panel = Panel(label="r", unit="Hz", series=curve, text=text)
+        plot = Plot(name="one", caption="", x_label="t", x_unit="s", panels=(panel,))
+        view = SmallPlot(Theme("light"))
+        view.show_plot(plot)
+        view.resize(340, view.minimumHeight())
+        view.show()
+        app.processEvents()
+        item = view.panels[0]
+        heights.append(item.box.height())
+    words = item.layout.itemAt(3, 0)
+    assert words.geometry().top() >= item.box.geometry().bottom() + 30, "and the axis"
+    assert words.geometry().bottom() <= item.geometry().height() + 1
+    assert heights[1] >= heights[0] - 10, "the curve has the room it had"
+
+
 def shown(app) -> SmallPlot:
     view = SmallPlot(Theme("light"))
     view.resize(340, 260)
