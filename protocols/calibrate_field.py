@@ -55,7 +55,9 @@ class CalibrateField(Protocol):
     signals: ClassVar[tuple[str, ...]] = ("coil_current", "field")
     checks: ClassVar[Literal["field"]] = "field"
 
-    most: PushCurrent = Field(default=1.0, description="Largest calibrated current")
+    most: PushCurrent = Field(
+        default=1.0, title="Largest current", description="Largest calibrated current"
+    )
     points: int = Field(
         default=21, ge=5, le=401, description="Steps on each branch, ends included"
     )

@@ -23,7 +23,9 @@ class Repeat(ForceProtocol):
     title: ClassVar[str] = "Repeated presentations"
 
     level: Force = Field(default=0.16, description="Force held")
-    count: int = Field(default=8, ge=2, le=10_000, description="Presentations")
+    count: int = Field(
+        default=8, ge=2, le=10_000, title="Presentations", description="Presentations"
+    )
     ramp: Pause = Field(default=0.25, description="Ramp up and ramp down, each")
     hold: Duration = Field(default=1.0, description="Time at the level")
     gap: Pause = Field(default=1.0, description="Time at no force after each")

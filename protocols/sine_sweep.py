@@ -64,7 +64,9 @@ class SineSweep(ForceProtocol):
     bias: Force = Field(default=0.0, description="Force the sine swings around")
     lowest: Frequency = Field(default=0.01, description="First frequency")
     highest: Frequency = Field(default=0.8, description="Last frequency")
-    count: int = Field(default=5, ge=1, le=1000, description="Frequencies")
+    count: int = Field(
+        default=5, ge=1, le=1000, title="Frequencies", description="Frequencies"
+    )
     cycles: int = Field(default=2, ge=1, le=10_000, description="Cycles of each")
     settle: Pause | None = Field(
         default=None, description="Time at the bias first; six tau of the film if empty"

@@ -24,7 +24,7 @@ class Staircase(Levels):
     """
 
     name: ClassVar[str] = "staircase"
-    title: ClassVar[str] = "Staircase (successive steps adapt: no rate-force curve)"
+    title: ClassVar[str] = "Staircase (no rate-force curve)"
 
     levels: tuple[Force, ...] = Field(
         default=(0.05, 0.1, 0.15, 0.2, 0.15, 0.1, 0.05, 0.0),

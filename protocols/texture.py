@@ -58,7 +58,9 @@ class Texture(ForceProtocol):
     )
     passes: int = Field(default=6, ge=1, le=1000, description="Scans at each speed")
     down: Duration = Field(default=0.1, description="Time down, and up again")
-    lasts: Duration = Field(default=0.8, description="Time of one scan")
+    lasts: Duration = Field(
+        default=0.8, title="Duration", description="Time of one scan"
+    )
     rest: Pause = Field(default=2.0, description="Time at no force after each")
 
     def presentations(self) -> Trials:

@@ -49,12 +49,16 @@ class Vibration(ForceProtocol):
     amplitude: PushForce = Field(default=0.08, description="Of the sine")
     lowest: Frequency = Field(default=10.0, description="First frequency")
     highest: Frequency = Field(default=100.0, description="Last frequency")
-    count: int = Field(default=4, ge=1, le=200, description="Frequencies")
+    count: int = Field(
+        default=4, ge=1, le=200, title="Frequencies", description="Frequencies"
+    )
     presentations_each: int = Field(
         default=6, ge=1, le=1000, description="Presentations of each frequency"
     )
     down: Duration = Field(default=0.1, description="Time down, and up again")
-    lasts: Duration = Field(default=0.4, description="Time of the vibration")
+    lasts: Duration = Field(
+        default=0.4, title="Duration", description="Time of the vibration"
+    )
     rest: Pause = Field(default=2.0, description="Time at no force after each")
 
     @model_validator(mode="after")

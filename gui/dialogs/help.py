@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from PySide6.QtCore import Qt
+import pyqtgraph
+import PySide6
+from PySide6.QtCore import Qt, qVersion
 from PySide6.QtWidgets import QGridLayout, QLabel, QLayout, QStackedWidget, QWidget
 
 from gui.dialogs.overlay import Overlay
@@ -119,6 +121,12 @@ PANELS = (
 )
 """Title and text of each topic; panels open the help at theirs."""
 
+LICENCES = (
+    "MIT licence. The sensor and its equations are from Birkoben et al., Scientific "
+    "Reports 2020, CC BY 4.0. Qt and PySide6 are used under the LGPL 3, pyqtgraph "
+    "under the MIT licence, the typeface Inter under the SIL Open Font License 1.1."
+)
+
 
 class Help(Overlay):
     """Two pages: panels and shortcuts, given as (keys, words)."""
@@ -174,8 +182,10 @@ class Help(Overlay):
     def _about(self) -> tuple[QWidget, QLayout]:
         """Which versions of what this is."""
         page = QWidget()
-        found = environment()
-        said = label(facts("Tactile Lab", _flat(found)), "", wrap=True)
+        drawn = {"Qt": qVersion(), "PySide6": PySide6.__version__}
+        drawn["pyqtgraph"] = pyqtgraph.__version__
+        found = facts("Tactile Lab", _flat({**environment(), **drawn}))
+        said = label(f"{found}<p>{LICENCES}</p>", "", wrap=True)
         said.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         return page, column(page, said, STRETCH)
 

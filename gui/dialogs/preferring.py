@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QCheckBox, QLayout, QLineEdit, QWidget
 from gui.ask_file import ask_file
 from gui.dialogs.overlay import Overlay
 from gui.parts import (
+    SCROLL_BAR,
     STRETCH,
     Part,
     column,
@@ -19,6 +20,7 @@ from gui.parts import (
     push,
     row,
     scrolling,
+    stack,
     with_gutter,
 )
 from gui.preferences import Preferences
@@ -62,7 +64,9 @@ class PreferencesCard(Overlay):
         area = with_gutter(scrolling(page), column(page, *parts, spacing=12))
         foot = row(STRETCH, self.close_button, self.save)
         whole = label("Settings", "big"), area, foot
-        column(self.card, *whole, margin=22, spacing=12)
+        # its scroll bar lies in the card's margin: fields end where Save does
+        rows = stack(self.card, whole, area, spacing=12)
+        rows.setContentsMargins(22, 22, 22 - SCROLL_BAR, 22)
         self.give_room(area, PAGE)
 
     def show_preferences(self) -> None:

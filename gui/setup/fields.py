@@ -132,7 +132,7 @@ def leading_place(value: float) -> float:
 
 
 class Switch(QCheckBox):
-    """On or off; its text is "True" or "False"."""
+    """On or off; its text is "true" or "false"."""
 
     edited = Signal()
 
@@ -142,11 +142,11 @@ class Switch(QCheckBox):
 
     def text(self) -> str:
         """What it says."""
-        return str(self.isChecked())
+        return "true" if self.isChecked() else "false"
 
     def put(self, text: str) -> None:
         """Switch."""
-        self.setChecked(text == "True")
+        self.setChecked(text == "true")
 
 
 class Choice(Combo):

@@ -6,6 +6,7 @@ No Qt here. Any table can be a form: `tactile_lab.table.fields_of` has its keys.
 from __future__ import annotations
 
 import json
+import re
 import types
 from dataclasses import dataclass
 from enum import Enum
@@ -65,7 +66,14 @@ class FormField:
 
     @property
     def title(self) -> str:
-        """The key as a person reads it; a symbol such as V_GS or g31 stays one."""
+        """The key as a person reads it, where its table has no better name for it.
+
+        A symbol such as V_GS or g31 stays one.
+        """
+        if self.info.title:
+            return self.info.title
+        if symbol := re.fullmatch(r"([A-Z]_[A-Za-z0-9]+)_([a-z_]+)", self.key):
+            return f"{symbol[1]} {symbol[2].replace('_', ' ')}"
         if len(self.key) < 3 or self.key[0].isupper() or self.key[-1].isdigit():
             return self.key
         words = self.key.replace("_", " ")
@@ -203,6 +211,8 @@ def text_of(parameter: FormField, value: Any) -> str:
         return ", ".join(value)
     if parameter.kind is Kind.OTHER:
         return toml(parameter.type.dump_python(value))
+    if parameter.kind is Kind.SWITCH:
+        return toml(value)
     return str(value)
 
 
@@ -262,7 +272,7 @@ def _value(parameter: FormField, text: str) -> Any:
         case Kind.NAMES:
             return tuple(text.replace(",", " ").split())
         case Kind.SWITCH:
-            return text == "True"
+            return text == "true"
         case Kind.INTEGER | Kind.NUMBER as kind:
             number, what = (
                 (int, "whole number") if kind is Kind.INTEGER else (float, "number")

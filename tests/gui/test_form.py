@@ -16,7 +16,7 @@ from gui.lanes.expected import Preview, Stretch
 from gui.parts import column, push, scrolling, with_gutter
 from gui.setup.fields import QuantityEdit
 from gui.setup.form import Form
-from gui.setup.parameter import FieldError, Kind, entry_of, listed, parameter
+from gui.setup.parameter import FieldError, Kind, entry_of, listed, parameter, text_of
 from gui.setup.picker import Picker
 from gui.setup.preview import _plan
 from gui.setup.subject import stated
@@ -51,6 +51,22 @@ def test_every_protocol_has_a_form_of_its_defaults(
     assert form.problem == ""
     plain, again = (load(inspect.getfile(kind), o) for o in ((), form.overrides()))
     assert again.protocol.model_dump() == plain.protocol.model_dump()
+
+
+def test_fields_are_named_as_one_speaks_of_them(app: QApplication) -> None:
+    """Lasts, Most and Count say nothing; a switch is true, as in its file."""
+    titles = {
+        parameter(key, info).title
+        for name in NAMES
+        for key, info in fields_of(protocol_class(name)).items()
+    }
+    assert {"Frequencies", "Presentations", "Largest current", "Duration"} <= titles
+    assert not {"Lasts", "Most", "Count"} & titles
+    info = fields_of(protocol_class("pulses"))["demagnetise"]
+    switch = parameter("demagnetise", info)
+    assert (text_of(switch, False), entry_of(switch, "true")) == ("false", "true")
+    assert parameter("V_GS_noise", info).title == "V_GS noise"
+    assert parameter("V_th", info).title == "V_th"
 
 
 @pytest.mark.parametrize(

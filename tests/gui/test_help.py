@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import QEvent, Qt, qVersion
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QMenu
+from PySide6.QtWidgets import QLabel, QMenu
 
 from gui.dialogs.help import PANELS, Help
 
@@ -55,6 +55,16 @@ def test_lanes_are_chosen_by_keys_alone(lab) -> None:
         QTest.keyClick(menu, Qt.Key.Key_Return)
         assert stack.is_hidden(key) is hidden
         lab.app.sendPostedEvents(menu, QEvent.Type.DeferredDelete)
+
+
+def test_about_names_what_draws_and_its_licences(lab) -> None:
+    lab.window.actions_.show_help(page=2)
+    shown = lab.window.findChild(Help)
+    told = [one.text() for one in shown.findChildren(QLabel)]
+    (said,) = (text for text in told if "pyqtgraph" in text)
+    for words in (qVersion(), "PySide6", "MIT licence", "LGPL", "CC BY 4.0"):
+        assert words in said
+    shown.hide()
 
 
 def test_every_topic_says_something() -> None:
