@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from tactile_lab.bench import CoilLimits
 from tactile_lab.errors import LimitError
 from tactile_lab.instruments.registry import coil_capability
 from tactile_lab.magnetics import Magnet
@@ -34,8 +35,8 @@ def wanted_current(trial: Trial, magnet: Magnet, coil: CoilSpec) -> Waveform:
         coil: limits, and the source that plays it.
 
     Raises:
-        LimitError: beyond the coil's limit, the calibration, or a source that gives
-            current of one sign.
+        LimitError: beyond the coil's limit, the compliance where the coil's resistance
+            is given, the calibration, or a source that gives current of one sign.
         SceneError: there is no such source.
     """
     length, limit = trial.length, coil.limits.current
@@ -52,10 +53,28 @@ def wanted_current(trial: Trial, magnet: Magnet, coil: CoilSpec) -> Waveform:
                 f'trial "{trial.label}": current {show(wanted.peak, "A")} is '
                 f"beyond the coil's limit of {show(limit, 'A')}."
             )
+    if (told := _too_little_voltage(wanted.peak, coil.limits)) is not None:
+        raise LimitError(f'trial "{trial.label}": {told}')
     if not source.bipolar and wanted.value.min() < -REVERSED:
         told = _one_sign(wanted, magnet, limit, source.title)
         raise LimitError(f'trial "{trial.label}": {told}')
     return wanted
+
+
+def _too_little_voltage(peak: float, limits: CoilLimits) -> str | None:
+    """Why `peak` A does not flow through the cold coil, or None."""
+    if limits.resistance is None:
+        return None
+    needed = peak * limits.resistance
+    if needed <= limits.compliance * (1 + 1e-9):
+        return None
+    most = limits.compliance / limits.resistance
+    return (
+        f"{show(peak, 'A')} through the coil's {show(limits.resistance, 'Ohm')} need "
+        f"{show(needed, 'V')}, the compliance is {show(limits.compliance, 'V')}: at "
+        f"most {show(most, 'A')} flow. Ask for less, or correct compliance or "
+        "resistance in [coil.limits]."
+    )
 
 
 def _one_sign(wanted: Waveform, magnet: Magnet, limit: float, title: str) -> str:

@@ -72,6 +72,14 @@ def test_force_beyond_the_coil_names_the_reachable_force():
     assert timeline(scene, through_coil=False).force.peak == 0.5
 
 
+def test_a_current_that_the_compliance_does_not_drive_through_the_coil_is_refused():
+    given = ['bench.coil.limits.resistance="20 Ohm"', 'protocol.levels=["160 mN"]']
+    with pytest.raises(LimitError, match=r"20 Ohm need 15\.95 V.*is 14 V"):
+        timeline(load(None, given), through_coil=True)
+    given[1] = 'protocol.levels=["130 mN"]'
+    assert timeline(load(None, given), through_coil=True).current is not None
+
+
 def test_a_hold_that_overheats_the_coil_is_refused_before_anything_opens():
     scene = load(None, ['protocol.levels=["200 mN"]', "protocol.hold=60 s"])
     with pytest.raises(LimitError, match="heat budget of 30"):
