@@ -31,11 +31,24 @@ QUIET = 0.05
 GAP_MARGIN = 0.005
 """How much later than the one after it a line may leave its port, s."""
 
+LONGEST_LATE = 4096
+"""Bytes without an end that are still taken once the time for an answer is over."""
+
 LONGEST_DRAIN = 1.0
 """Longest time a far end may keep talking while the line is drained, s."""
 
 Spy = Callable[[str, bytes, float], None]
 """Told of each (direction ">" or "<", bytes, clock time s)."""
+
+
+def _with_the_rest(port: serial.Serial, line: bytes, end: bytes) -> bytes:
+    """`line` and what has come of it: a busy computer reads late what came in time.
+
+    pyserial takes a single byte once its time is over, and leaves the others.
+    """
+    while not line.endswith(end) and len(line) < LONGEST_LATE and port.in_waiting:
+        line += port.read(1)
+    return line
 
 
 class SerialLink:
@@ -347,6 +360,7 @@ class SerialLink:
                     line += port.read_until(end)
                     self._beat()
                     if self._clock.now() >= due:
+                        line = _with_the_rest(port, line, end)
                         break
             self._rest_from(self._clock.now())
             if line:
@@ -373,7 +387,12 @@ class SerialLink:
         self._doubtful = True
         return BadReplyError(
             f"The {self._what} at {self.port} answered {line!r} to {asked!r}, which is "
-            "no text of its dialect. Check baud rate, parity and cable."
+            "no text of its dialect. Check "
+            + (
+                "its terminator, and that the port is that of its text commands."
+                if self.port.startswith("socket:")
+                else "baud rate, parity and cable."
+            )
         )
 
     @contextmanager
