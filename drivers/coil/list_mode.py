@@ -50,7 +50,7 @@ def check_list(points: CurrentList, limits: CoilLimits, row: CoilDialect) -> Lis
                 f"A dwell of {show(dwell, 's')} cannot be played; the source takes "
                 f"{show(mode.shortest, 's')} to {show(mode.longest, 's')}."
             )
-    check_points(points, limits, row)
+    check_points(points, limits, row, row.grain)
     return mode
 
 
@@ -63,7 +63,8 @@ def check_points(
         points: the last must be 0 A.
         limits: in force.
         row: the source's dialect.
-        grain: step of what makes the currents, A: a slope may seem so much steeper.
+        grain: step to which the currents are rounded, A: a slope may seem so much
+            steeper.
 
     Raises:
         LimitError: a current or step is beyond a limit, or they do not end at 0 A.

@@ -19,6 +19,7 @@ from tactile_lab.errors import (
     RefusedError,
 )
 from tactile_lab.instruments.dialects import coil_dialect
+from tactile_lab.waveform import Waveform
 
 SINE = [round(0.3 * math.sin(2 * math.pi * k / 100), 6) for k in range(100)] + [0.0]
 
@@ -129,6 +130,16 @@ def test_a_list_that_may_not_be_played(bench, currents, dwell, why):
         play(bench.coil, currents, dwell)
     assert bench.source.changes == before
     assert bench.source.list.points == []
+
+
+def test_a_list_made_for_the_slew_limit_is_not_refused_for_its_rounding(bench):
+    row, limits = bench.coil.dialect, bench.coil.limits
+    top = 0.0501 / limits.fastest
+    wave = Waveform.through([(0, 0), (top, 0.0501), (2 * top, 0), (3 * top, 0)])
+    points = row.lists().following(wave)
+    assert points.steepest > limits.fastest * (1 + 1e-3)
+    bench.coil.load_list(points)
+    assert len(bench.source.list.points) == len(points)
 
 
 @pytest.mark.parametrize("line", ["LIST:DWEL", "LIST:COUN", "LIST:CLE"])
