@@ -272,10 +272,19 @@ class ReadbackCheck:
         """Why the current must stop, or None; A and V."""
         if not self._deviates((setpoint, setpoint), measured):
             return None
+        if abs(measured) > abs(setpoint):
+            why = (
+                "it was set by hand, or its analogue input adds. Check its front panel"
+            )
+        else:
+            why = (
+                f"the circuit is open, the compliance of {show(compliance, 'V')} is "
+                "too low, or it was switched off, reset or set by hand. Check leads, "
+                "limit and front panel"
+            )
         return (
-            f"The source is set to {show(setpoint, 'A')} but {show(measured, 'A')} "
-            f"flows, {self.deviating} readings in a row: the circuit is open, or the "
-            f"compliance of {show(compliance, 'V')} is too low. Check leads and limit."
+            f"The source was set to {show(setpoint, 'A')} but {show(measured, 'A')} "
+            f"flows, {self.deviating} readings in a row: {why}."
         )
 
     def list_complaint(

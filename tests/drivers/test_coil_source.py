@@ -189,6 +189,30 @@ def test_an_open_circuit_trips(bench):
     assert not far.output_on
 
 
+@pytest.mark.parametrize(
+    ("done", "why"),
+    [
+        (lambda far: far.reset(), "switched off, reset or set by hand"),
+        (lambda far: far.set_current(0.55), "row: it was set by hand"),
+    ],
+)
+def test_a_source_that_somebody_else_set_is_not_called_an_open_circuit(
+    bench, done, why
+):
+    clock, _plant, far, coil = bench
+    coil.open()
+    coil.energise()
+    for _ in range(10):
+        clock.sleep_until(clock.now() + coil.update_interval)
+        coil.set_current(0.5)
+    done(far)
+    clock.sleep_until(clock.now() + 0.2)
+    with pytest.raises(InterlockError, match=why):
+        for _ in range(5):
+            coil.read_current()
+    assert not far.output_on
+
+
 def test_output_on_at_connect_is_ramped_down(bench):
     _clock, _plant, far, coil = bench
     far.switch(True)
