@@ -71,7 +71,7 @@ def heights_of(
             for each in (values, lines, words):
                 del each[gone]
     apart = min(LINE, height - 2 * HALF)
-    if len(words) == 2 and apart <= 2 * HALF:  # there is room for one
+    if len(words) == 2 and apart < CLOSE:  # there is room for one
         values, lines, words = values[1:], lines[1:], words[1:]
     elif len(words) == 2 and words[0] - words[1] < apart:
         # not quite beside their lines

@@ -106,11 +106,11 @@ def spectrum_plot(signal: str, found: Noise) -> Plot:
         x=at,
         y=[found.density[i] for i in nearest],
         mark="points",
-        colour="V_C1",
+        colour="ink",
         name="mains" if lines else "",
         texts=tuple(f"{f:g} Hz" if n < 2 else "" for n, f in enumerate(at)),
     )
-    trace = Series(x=frequency, y=density, name=signal, colour="V_K")
+    trace = Series(x=frequency, y=density, name=signal, colour=signal)
     return Plot(
         name="noise",
         caption="Density of the noise (Welch), in bins even in the logarithm of the "

@@ -131,7 +131,8 @@ class ResultsView(QWidget):
             self.cards.mark_old(len(steps) > len(self._steps))
         self._steps, self._model, self._laws = tuple(steps), (), ()
         self._show_rates()
-        self._fill(steps)
+        # while a run goes on, what lies below moves for no step of the first four
+        self._fill(steps, max(len(steps), min(total or 4, 4) if running else 0))
         self._arrange()
         self.mark.setVisible(bool(steps) or running)
         many = count(len(steps), "step")
@@ -240,7 +241,7 @@ class ResultsView(QWidget):
         self._facts.setVisible(bool(text))
         self.report.setVisible(report)
 
-    def _fill(self, steps: Sequence[MeasuredTrial]) -> None:
+    def _fill(self, steps: Sequence[MeasuredTrial], rows: int) -> None:
         table = self.table
         if table.rowCount() > len(steps):
             table.setRowCount(0)
@@ -251,7 +252,7 @@ class ResultsView(QWidget):
                 item.setTextAlignment(RIGHT if where else LEFT)
                 item.setToolTip("" if where else text)
                 table.setItem(at, where, item)
-        table.setFixedHeight(HEAD + ROW * max(len(steps), 4))  # the page scrolls
+        table.setFixedHeight(HEAD + ROW * max(rows, 1))  # the page scrolls
 
     def _choose(self, row: int) -> None:
         step = self._steps[row]

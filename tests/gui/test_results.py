@@ -69,6 +69,19 @@ def test_a_column_is_drawn_against_another(results: ResultsView) -> None:
     assert results._title.text() == "First spike against peak rate"
 
 
+def test_the_table_is_as_high_as_its_steps(results: ResultsView) -> None:
+    """Below the one step of a hold was a gap of three rows."""
+
+    def high(count: int, *, running: bool) -> int:
+        steps = [SILENT, SLOW, FAST][:count]
+        results.show_steps(steps, total=3, running=running, whole=not running)
+        return results.table.height()
+
+    one, two = (high(count, running=False) for count in (1, 2))
+    assert two - one == results.table.rowHeight(0)
+    assert high(1, running=True) == high(3, running=True), "nothing below it moves"
+
+
 def test_the_rates_go_with_the_force_alone(results: ResultsView) -> None:
     results.against.setCurrentText("start")
     assert results.drawn.currentText() == "peak rate"
