@@ -303,11 +303,17 @@ class ResultsView(QWidget):
 
 
 def _html(table: Table) -> str:
-    """A table as rich text."""
+    """A table as rich text, in columns as narrow as their numbers."""
     rows = [
-        "".join(f"<td>{escape(cell)}&nbsp;&nbsp;</td>" for cell in row)
+        "".join(f'<td style="padding-right: 6px">{_cell(cell)}</td>' for cell in row)
         for row in (table.headings, *table.rows)
     ]
     cells = "".join(f"<tr>{row}</tr>" for row in rows)
     title, note = escape(table.title), escape(table.note)
-    return f"<p><b>{title}</b></p><table>{cells}</table>{note}"
+    small = f'<table cellspacing="0" style="font-size: 11px">{cells}</table>'
+    return f"<p><b>{title}</b></p>{small}{note}"
+
+
+def _cell(text: str) -> str:
+    """What stands in a cell; a line ends before ±, not behind it."""
+    return escape(unbroken(text)).replace("± ", "±&nbsp;")

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QScrollArea
 
 from gui.look.theme import Theme
 from gui.review.live_plots import COLUMNS, column_plot, rate_plot
 from gui.review.results import ResultsView
 from gui.session.fit import FitInput, fit
+from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial
 
 SILENT, SLOW, FAST = (
@@ -80,6 +81,21 @@ def test_the_table_is_as_high_as_its_steps(results: ResultsView) -> None:
     one, two = (high(count, running=False) for count in (1, 2))
     assert two - one == results.table.rowHeight(0)
     assert high(1, running=True) == high(3, running=True), "nothing below it moves"
+
+
+def test_a_wide_table_of_the_report_pushes_nothing_out_of_the_page(
+    results: ResultsView, app
+) -> None:
+    """Five columns of a sine sweep cut bars and the button off at the right."""
+    row = ("0.0299 Hz", "2.04662 ± 0.00077", "−148.576 ± 0.021", "2.04798", "−148.581")
+    headings = ("Frequency", "Gain, V/N", "Phase, °", "Model", "Model, °")
+    results.resize(332, 900)
+    results.show()
+    results.show_statements(["Told."], [Table(headings=headings, rows=(row,))])
+    app.processEvents()
+    (area,) = results.findChildren(QScrollArea)
+    assert area.widget().width() <= area.viewport().width()
+    assert "± " not in results.tables.text(), "no line ends between it and its number"
 
 
 def test_the_rates_go_with_the_force_alone(results: ResultsView) -> None:
