@@ -25,6 +25,9 @@ NONE = (
 )
 
 
+POINT = 380
+"""Width of a point with two keys, px."""
+
 HINT = "Click a point or a cell: its run opens, or its scene where none was kept."
 
 
@@ -60,7 +63,7 @@ class StudiesCard(Overlay):
         self.close_button.clicked.connect(self.hide)
         self.points = Combo()
         self.points.setAccessibleName("Point")
-        self.points.setMaximumWidth(220)
+        self.points.setMaximumWidth(POINT)
         self.point = push("Open the point")
         self.point.clicked.connect(lambda: self._pick(self.points.currentData()))
         inner = QWidget()

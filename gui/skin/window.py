@@ -158,7 +158,7 @@ class SkinWindow(QWidget):
         self.raster.show_time(self._at)
         counts = film.counts(self._at)
         self.map.show_rates(counts / film.stretch, film.most / film.stretch)
-        say(self.when, f"{self._at:.3f} s of {show(self._skin.duration, 's')}")
+        say(self.when, f"{self._at:.3f} of {self._skin.duration:.3f} s")
         self.numbers.set_whole(
             f"{count(int(counts.sum()), 'spike')} of "
             f"{count(int((counts > 0).sum()), 'taxel')} in the "

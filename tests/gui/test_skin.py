@@ -126,7 +126,7 @@ def test_play_moves_on_to_the_end_and_stops_there(lab, folder, events):
     lab.until(lambda: not window.play.isChecked())
     assert window.slider.value() == window.slider.maximum()
     window.slider.setValue(0)
-    assert window.when.text().startswith("0.000 s of 400 ms")
+    assert window.when.text().startswith("0.000 of 0.400 s")
     window.close()
 
 

@@ -48,6 +48,10 @@ def test_figures_come_with_the_points_and_stay(lab, tmp_path: Path) -> None:
     names = [one.plot.name for one in card.figures if one.plot is not None]
     assert names == ["map", "response_0", "response_1"]
     assert card.page.isEnabled()
+    first = card.points.itemText(0)
+    room = card.points.maximumWidth() - 40
+    wide = card.points.fontMetrics().horizontalAdvance(first)
+    assert wide <= room, first
     (out / "onset" / "results.json").write_text("{")
     card.refresh()
     assert "holds no study that can be read" in card.text.text()
