@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from gui.parts import Combo
-from tactile_lab.plugins import protocol_class, protocol_names, scene_path
+from tactile_lab.plugins import protocol_class, protocol_names, scene_names
 from tactile_lab.trial import Protocol
 
 TURN = 20
@@ -85,7 +85,7 @@ class Picker(Combo):
 
 def scene_of(protocol: str) -> str:
     """Name of a protocol's ready scene, else path of the file that defines it."""
-    if scene_path(protocol).is_file():
+    if protocol in scene_names():
         return protocol
     return inspect.getfile(protocol_class(protocol))
 

@@ -104,7 +104,8 @@ def describe(path: Path) -> dict[str, Any]:
                     "spikes": int(row["spikes"]),
                     "complete": whole,
                 }
-                for row, whole in zip(run.trials, run.completed, strict=True)
+                # a run that goes on may have begun another between the two
+                for row, whole in zip(run.trials, run.completed, strict=False)
             ]
             summary["overrange_blocks"] = int(run.records("overrange").size)
     return summary

@@ -189,7 +189,7 @@ def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
             _clock(run, scene, float(row["start"]), float(row["end"])),
             blind,
         )
-        for row, complete in zip(run.trials, run.completed.tolist(), strict=True)
+        for row, complete in zip(run.trials, run.completed.tolist(), strict=False)
     ]
     end = max((t.start + t.duration for t in trials), default=0.0)
     late = spikes[(spikes >= end) & (spikes < run.stopped)] - end

@@ -290,7 +290,7 @@ class StoredRun:
         stopped; so does its hold, if it was reached. The fall after it is no trial's.
         """
         rows = self.records("trials")
-        for number in np.flatnonzero(~self.completed):
+        for number in np.flatnonzero(~_ended(rows)):
             row = rows[number]
             row["end"] = min(row["end"], self.duration, self.stopped)
             length, times = row["end"] - row["start"], self.spikes["time"]
@@ -310,11 +310,7 @@ class StoredRun:
     @property
     def completed(self) -> NDArray[np.bool_]:
         """Which trials came to their end; older runs stored only those."""
-        rows = self.records("trials")
-        if "complete" not in (rows.dtype.names or ()):
-            return np.ones(rows.size, np.bool_)
-        ended: NDArray[np.bool_] = rows["complete"] != 0
-        return ended
+        return _ended(self.records("trials"))
 
     @property
     def current(self) -> Records:
@@ -457,3 +453,11 @@ class StoredRun:
             f"{kind}, {show(self.duration, 's')}, {count(trials, 'trial')}, "
             f"{count(spikes, 'spike')}; {', '.join(self.signals) or 'no samples'}>"
         )
+
+
+def _ended(trials: Records) -> NDArray[np.bool_]:
+    """Which of these trials came to their end."""
+    if "complete" not in (trials.dtype.names or ()):
+        return np.ones(trials.size, np.bool_)
+    ended: NDArray[np.bool_] = trials["complete"] != 0
+    return ended

@@ -4,6 +4,7 @@ import json
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -12,6 +13,7 @@ from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
+from tactile_lab.store.run import Run
 from tactile_lab.store.verify import verify
 
 BENCH = runpy.run_path(str(Path(__file__).parents[1] / "store" / "conftest.py"))
@@ -104,6 +106,15 @@ def test_a_trial_that_the_run_ended_before_is_not_said_to_end_before_it_begins(r
     ]
     (trial,) = (text for name, text in rows(told) if name == "trial")
     assert trial.split(maxsplit=2)[2].startswith("would have begun at 4.700 s, 0 ")
+
+
+def test_a_run_that_begins_a_trial_while_it_is_described(run, monkeypatch):
+    """As the window's page on a run that goes on may find it."""
+    from tactile_lab.commands.show import describe
+
+    before, read = len(describe(run)["trials"]), Run.completed.fget
+    monkeypatch.setattr(Run, "completed", property(lambda r: np.append(read(r), False)))
+    assert len(describe(run)["trials"]) == before
 
 
 @pytest.mark.parametrize("verb", ["show", "verify", "recover"])

@@ -209,6 +209,16 @@ def test_the_list_of_protocols_has_all_titles_when_it_is_opened(app) -> None:
     assert titles == [protocol_class(name).title for name in protocol_names()]
 
 
+@pytest.mark.parametrize("name", protocol_names())
+def test_any_protocol_of_the_list_can_be_chosen(app, name) -> None:
+    """Those without a ready scene of their name, too: pulses and hold."""
+    picker, picked = Picker(), []
+    picker.show_protocol(protocol_class("pulses"))
+    picker.picked.connect(picked.append)
+    picker.activated.emit(picker.findData(name))
+    assert load(picked[0]).protocol.name == name
+
+
 def test_an_edited_form_may_be_forgotten(app: QApplication) -> None:
     """Python's collector ended the process (signal 11) where Qt's stack held edits."""
     form = Form()
