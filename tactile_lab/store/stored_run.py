@@ -207,7 +207,7 @@ class StoredRun:
         if self.samples:
             ends.append(float(self.axis.time_of(float(self.samples))))
         trials = self.records("trials")
-        ended = trials[self.completed]["end"]
+        ended = trials[_ended(trials)]["end"]
         ends += [float(last) for last in ended[-1:]]
         ends += [float(last) for last in self.records("current")["time"][-1:]]
         return max(ends)
