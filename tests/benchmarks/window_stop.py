@@ -90,7 +90,7 @@ class Source:
         row = rows.joinpath("kepco-bop.toml").read_text()
         if answer is not None:
             row = row.replace("[serial]", f'[serial]\nlatency = "{1e3 * answer:g} ms"')
-        row = row.replace("[serial]", '[serial]\ntimeout = "2 s"')
+        row = row.replace("[serial]", '[serial]\ntimeout = "0.8 s"')
         (folder / "source.toml").write_text(row)
         self._log = folder / "told.jsonl"
         self.served = ServedBench(
