@@ -20,7 +20,7 @@ import numpy as np
 from tactile_lab.arrays import FloatArray
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
-from tactile_lab.validation.table import markdown, provenance
+from tactile_lab.validation.table import markdown, provenance, save
 from tactile_lab.waveform import Waveform
 
 DOCS = Path(__file__).parent
@@ -213,8 +213,7 @@ def _draw(results: list[tuple[Point, Found]]) -> None:
     axes[0].set_ylabel("Highest rate (Hz)")
     axes[0].legend(frameon=False)
     plot.suptitle("V_GS = 1.4 V, V_P does not decay, 2 s", fontsize=9, color="0.3")
-    plot.savefig(DOCS / "saturation.svg", metadata={"Date": None})
-    plt.close(plot)
+    save(plot, DOCS / "saturation.svg")
 
 
 HEAD = (

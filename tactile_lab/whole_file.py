@@ -6,9 +6,10 @@ What grows while a run goes on (samples, ledger, log) has a way of its own.
 
 from __future__ import annotations
 
+import csv
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -61,3 +62,13 @@ def write_text(path: Path, text: str, *, lasting: bool = False) -> None:
     data = text.encode()
     with replacing(path, len(data), lasting=lasting) as part:
         part.write_bytes(data)
+
+
+def write_rows(
+    path: Path, heads: Iterable[object], rows: Iterable[Iterable[object]]
+) -> None:
+    """Replace `path` in one step by a table of comma-separated values, in UTF-8."""
+    with replacing(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(heads)
+        writer.writerows(rows)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import statistics
 from collections.abc import Callable, Mapping, Sequence
@@ -24,9 +23,9 @@ from tactile_lab.validation.contest import (
     methods,
 )
 from tactile_lab.validation.problem import Problem
-from tactile_lab.validation.table import markdown, provenance
+from tactile_lab.validation.table import markdown, provenance, save
 from tactile_lab.waveform import Waveform
-from tactile_lab.whole_file import replacing
+from tactile_lab.whole_file import write_rows
 
 COLUMNS = (
     "scene", "method", "setting", "runs", "verdict", "spikes", "spike_error_s",
@@ -239,16 +238,7 @@ def _orders(by_scene: Mapping[str, Sequence[Row]]) -> list[list[str]]:
 
 def write_csv(rows: Sequence[Row], path: Path) -> None:
     """All rows with full digits."""
-    with (
-        replacing(path) as part,
-        part.open("w", newline="", encoding="utf-8") as file,
-    ):
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for row in rows:
-            writer.writerow(
-                "" if value is None else value for value in vars(row).values()
-            )
+    write_rows(path, COLUMNS, (vars(row).values() for row in rows))
 
 
 def cell(row: Row) -> tuple[str, ...]:
@@ -377,6 +367,4 @@ def figure(rows: Sequence[Row], path: Path) -> None:
         list(handles.values()), list(handles), loc="outside lower center", ncols=4,
         frameon=False, fontsize=9,
     )  # fmt: skip
-    with replacing(path) as part:
-        plot.savefig(part, metadata={"Date": None})
-    plt.close(plot)
+    save(plot, path)

@@ -17,9 +17,9 @@ from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.model.state import Start
 from tactile_lab.validation.reference import reference
-from tactile_lab.validation.table import provenance
+from tactile_lab.validation.table import provenance, save
 from tactile_lab.waveform import Waveform
-from tactile_lab.whole_file import replacing
+from tactile_lab.whole_file import write_rows
 
 SAMPLES = 40
 """Times at which V_C1 is compared."""
@@ -216,13 +216,8 @@ def campaign(count: int, out: Path | None, say: Callable[[str], None]) -> Measur
                 if (seed + 1) % 50 == 0:
                     say(f"{kind}: {seed + 1} random scenes")
     if file is not None:
-        with (
-            replacing(file) as part,
-            part.open("w", newline="", encoding="utf-8") as whole,
-        ):
-            writer = csv.writer(whole, lineterminator="\n")
-            writer.writerow(("scenes", "seed", "answer", *NUMBERS))
-            writer.writerows((*key, *kept[key]) for key in sorted(kept))
+        heads = ("scenes", "seed", "answer", *NUMBERS)
+        write_rows(file, heads, ((*key, *kept[key]) for key in sorted(kept)))
     return found
 
 
@@ -292,9 +287,7 @@ def scatter(rows: Measured, path: Path) -> None:
         )  # fmt: skip
         axis.grid(visible=True, color="0.92")
     axes[0].legend(frameon=False, loc="lower right")
-    with replacing(path) as part:
-        plot.savefig(part, metadata={"Date": None})
-    plt.close(plot)
+    save(plot, path)
 
 
 def _section(found: Sequence[HonestyRow]) -> list[str]:

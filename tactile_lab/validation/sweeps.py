@@ -6,7 +6,6 @@ the number of spikes.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,9 +28,9 @@ from tactile_lab.validation.contest import (
 )
 from tactile_lab.validation.extremes import formula, grazing
 from tactile_lab.validation.problem import Problem
-from tactile_lab.validation.table import markdown, provenance
+from tactile_lab.validation.table import markdown, provenance, save
 from tactile_lab.waveform import Waveform
-from tactile_lab.whole_file import replacing, write_text
+from tactile_lab.whole_file import write_rows, write_text
 
 SETTINGS = {
     OURS: "tol 1e-09", "Dormand-Prince 5(4)": "tol 1e-09", "Rodas5P": "tol 1e-09",
@@ -117,23 +116,16 @@ def _judged(
 
 def write(points: Sequence[Point], cap: float, out: Path) -> None:
     """sweeps.md, sweeps.csv and sweeps.svg."""
-    with (
-        replacing(out / "sweeps.csv") as part,
-        part.open("w", newline="", encoding="utf-8") as file,
-    ):
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(
-            "sweep at method setting verdict error_s evaluations time_s".split()
+    heads = "sweep at method setting verdict error_s evaluations time_s".split()
+    rows = (
+        (
+            p.sweep, f"{p.at:g}", p.row.method, p.row.setting, p.row.verdict,
+            "" if p.row.spike_error is None else f"{p.row.spike_error:.3g}",
+            p.row.evaluations, f"{p.row.run_time:.4g}",
         )
-        for p in points:
-            r = p.row
-            rows.writerow(
-                [
-                    p.sweep, f"{p.at:g}", r.method, r.setting, r.verdict,
-                    "" if r.spike_error is None else f"{r.spike_error:.3g}",
-                    r.evaluations, f"{r.run_time:.4g}",
-                ]
-            )  # fmt: skip
+        for p in points
+    )  # fmt: skip
+    write_rows(out / "sweeps.csv", heads, rows)
     parts = [
         "# Three sweeps\n",
         f"{provenance()} Written by `tactile-lab validate sweeps --cap {cap:g} --out "
@@ -203,6 +195,4 @@ def _figure(points: Sequence[Point], path: Path) -> None:
     plot.legend(
         handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=9
     )
-    with replacing(path) as part:
-        plot.savefig(part, metadata={"Date": None})
-    plt.close(plot)
+    save(plot, path)

@@ -1,4 +1,4 @@
-"""What the reports of this room share: where a number comes from, and tables."""
+"""What the reports of this room share: provenance, tables, how a figure is kept."""
 
 from __future__ import annotations
 
@@ -8,6 +8,12 @@ import subprocess
 from collections.abc import Iterable, Sequence
 from datetime import date
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tactile_lab.whole_file import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def provenance() -> str:
@@ -28,3 +34,12 @@ def markdown(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A table in Markdown."""
     lines = [headings, ["---"] * len(headings), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def save(plot: Figure, path: Path) -> None:
+    """Write a figure as SVG, without the date, and let go of it."""
+    import matplotlib.pyplot as plt
+
+    with replacing(path) as part:
+        plot.savefig(part, metadata={"Date": None})
+    plt.close(plot)

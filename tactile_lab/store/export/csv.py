@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from tactile_lab.store.export.lines import CodeText, Text, fixed, lines, steps, 
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
-from tactile_lab.whole_file import replacing
+from tactile_lab.whole_file import replacing, write_rows
 
 AT_ONCE = 1 << 15
 """Rows turned into text at once: more do not fit a processor's cache."""
@@ -87,14 +86,8 @@ def _text(run: Run, name: str, selection: Selection) -> Callable[[FloatArray], T
 
 
 def _table(path: Path, table: ExportTable) -> Path:
-    with (
-        replacing(path) as part,
-        part.open("w", encoding="utf-8", newline="") as file,
-    ):
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(table.heads)
-        columns = (_cells(column.tolist()) for column in table.columns.values())
-        writer.writerows(zip(*columns, strict=True))
+    columns = (_cells(column.tolist()) for column in table.columns.values())
+    write_rows(path, table.heads, zip(*columns, strict=True))
     return path
 
 
