@@ -168,7 +168,11 @@ def _killed(
         return "ended before"
     before = on_disk(folder)
     own = children(pid)
-    os.kill(draw.choice(targets), signal.SIGKILL)
+    try:
+        os.kill(draw.choice(targets), signal.SIGKILL)
+    except ProcessLookupError:  # as the finished batches were hashed
+        client.join()
+        return "ended before"
     client.join(STANDS)
     if client.is_alive():
         client.kill()
