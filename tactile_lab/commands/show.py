@@ -42,6 +42,7 @@ def describe(path: Path) -> dict[str, Any]:
     from tactile_lab.store.folder import DATA, has_lost_data, is_live, read_info
     from tactile_lab.store.remarks import read_remarks
     from tactile_lab.store.run import Run
+    from tactile_lab.store.stored_run import ended
 
     info = read_info(path)
     cut = info["status"] == "running" and not is_live(path)
@@ -95,6 +96,7 @@ def describe(path: Path) -> dict[str, Any]:
                 for signal in [run.signal(name)]
             }
             summary["spikes"] = int(run.spikes.size)
+            trials = run.trials
             summary["trials"] = [
                 {
                     "label": row["label"].decode(),
@@ -104,8 +106,7 @@ def describe(path: Path) -> dict[str, Any]:
                     "spikes": int(row["spikes"]),
                     "complete": whole,
                 }
-                # a run that goes on may have begun another between the two
-                for row, whole in zip(run.trials, run.completed, strict=False)
+                for row, whole in zip(trials, ended(trials), strict=True)
             ]
             summary["overrange_blocks"] = int(run.records("overrange").size)
     return summary

@@ -30,6 +30,7 @@ from tactile_lab.store.overrange import unsearched
 from tactile_lab.store.progress import Progress, each, nothing
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
+from tactile_lab.store.stored_run import ended
 from tactile_lab.waveform import Waveform
 
 CELLS = 4000
@@ -178,7 +179,7 @@ def stimulus_onset(scene: Scene) -> float:
 def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
     """The trials, and what came after the last in a run that ended before its time."""
     spikes, scene = run.spikes["time"], run.scene
-    blind = unsearched(run)
+    blind, rows = unsearched(run), run.trials
     trials = [
         _trial(
             row,
@@ -189,7 +190,7 @@ def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
             _clock(run, scene, float(row["start"]), float(row["end"])),
             blind,
         )
-        for row, complete in zip(run.trials, run.completed.tolist(), strict=False)
+        for row, complete in zip(rows, ended(rows).tolist(), strict=True)
     ]
     end = max((t.start + t.duration for t in trials), default=0.0)
     late = spikes[(spikes >= end) & (spikes < run.stopped)] - end

@@ -207,8 +207,7 @@ class StoredRun:
         if self.samples:
             ends.append(float(self.axis.time_of(float(self.samples))))
         trials = self.records("trials")
-        ended = trials[_ended(trials)]["end"]
-        ends += [float(last) for last in ended[-1:]]
+        ends += [float(last) for last in trials[ended(trials)]["end"][-1:]]
         ends += [float(last) for last in self.records("current")["time"][-1:]]
         return max(ends)
 
@@ -290,7 +289,7 @@ class StoredRun:
         stopped; so does its hold, if it was reached. The fall after it is no trial's.
         """
         rows = self.records("trials")
-        for number in np.flatnonzero(~_ended(rows)):
+        for number in np.flatnonzero(~ended(rows)):
             row = rows[number]
             row["end"] = min(row["end"], self.duration, self.stopped)
             length, times = row["end"] - row["start"], self.spikes["time"]
@@ -310,7 +309,7 @@ class StoredRun:
     @property
     def completed(self) -> NDArray[np.bool_]:
         """Which trials came to their end; older runs stored only those."""
-        return _ended(self.records("trials"))
+        return ended(self.records("trials"))
 
     @property
     def current(self) -> Records:
@@ -455,9 +454,12 @@ class StoredRun:
         )
 
 
-def _ended(trials: Records) -> NDArray[np.bool_]:
-    """Which of these trials came to their end."""
+def ended(trials: Records) -> NDArray[np.bool_]:
+    """Which of these trials came to their end; older runs stored only those.
+
+    To be asked of the trials at hand: a run that goes on may have more by now.
+    """
     if "complete" not in (trials.dtype.names or ()):
         return np.ones(trials.size, np.bool_)
-    ended: NDArray[np.bool_] = trials["complete"] != 0
-    return ended
+    found: NDArray[np.bool_] = trials["complete"] != 0
+    return found

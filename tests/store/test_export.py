@@ -72,6 +72,13 @@ def test_csv_has_units_in_its_header_and_si_values(run, tmp_path):
     assert rows(tmp_path / "csv" / "trials.csv")[1][1] == 'the "120"'
 
 
+def test_a_run_that_begins_a_trial_while_it_is_exported(run, tmp_path, monkeypatch):
+    read = Run.completed.fget
+    monkeypatch.setattr(Run, "completed", property(lambda r: np.append(read(r), False)))
+    to_csv.export(run, tmp_path, Selection())
+    assert len(rows(tmp_path / "trials.csv")) == 1 + run.trials.size
+
+
 def test_a_part_at_a_lower_rate_is_averaged_and_keeps_gaps_apart(run, tmp_path):
     part = Selection(signals=("V_C1",), start=2.5, end=53.5, rate=100.0)
     to_csv.export(run, tmp_path, part)

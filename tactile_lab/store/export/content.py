@@ -15,6 +15,7 @@ from tactile_lab.store.folder import SCENE
 from tactile_lab.store.overrange import told as overrange_told
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
+from tactile_lab.store.stored_run import ended
 
 UNITS = {
     "gaps": {"start": "s", "end": "s"},
@@ -84,7 +85,7 @@ def _trials(run: Run) -> ExportTable:
         "hold_end": rows["start"] + rows["hold_end"],
         "spikes": rows["spikes"],
         "pause": rows["pause"],
-        "complete": run.completed.astype(np.uint8),
+        "complete": ended(rows).astype(np.uint8),
     }
     units = dict.fromkeys(columns, "")
     units |= {"level": "N", "start": "s", "end": "s", "hold_start": "s"}
