@@ -164,9 +164,11 @@ def _bands(
     windows: Mapping[str, Window],
 ) -> tuple[float, float]:
     """Halves of the bands of a voltage's mean and of a change of it, V."""
+    if known is not None:
+        return Z95 * known.error, 2 * known.known
     one = _known(run, trace, windows)
-    # without a calibration the channel's offset may be a code; a change knows neither
-    return Z95 * known.error if known else math.hypot(one, CODE), 2 * one
+    # the channel's offset may be a code; a change knows it not
+    return math.hypot(one, CODE), 2 * one
 
 
 def _calibrated(
