@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from tactile_lab.analysis.estimate import standard_error
 from tactile_lab.analysis.field_calibration import (
     FieldCalibration,
     FieldStep,
@@ -192,9 +193,7 @@ def _steps(run: Measurement) -> list[FieldStep]:
         applied = run.current_at(trial.held[1])
         if not readings.size or applied is None:
             continue
-        error = HALF_A_DIGIT
-        if readings.size > 1:
-            error = float(readings.std(ddof=1) / np.sqrt(readings.size))
+        error = standard_error(readings) if readings.size > 1 else HALF_A_DIGIT
         field = float(readings.mean())
         steps.append(
             FieldStep(branch=branch, current=applied, field=field, error=error)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.analysis.adaptation import Adaptation, fit_adaptation
 from tactile_lab.analysis.converter import step_bias
+from tactile_lab.analysis.estimate import standard_error
 from tactile_lab.analysis.spike_train import Response, respond
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
@@ -318,10 +319,7 @@ class Measurement:
         trace = self.trace(signal)
         if trace is None:
             return 0.0
-        values = trace.mean[(trace.time >= start) & (trace.time <= end)]
-        if values.size < 2:
-            return 0.0
-        return float(values.std(ddof=1) / np.sqrt(values.size))
+        return standard_error(trace.mean[(trace.time >= start) & (trace.time <= end)])
 
     def left_range(self, signal: str, start: float, end: float) -> bool:
         """Whether a signal left its channel's range within [start, end] s."""

@@ -137,6 +137,13 @@ class Line:
         )
 
 
+def standard_error(values: FloatArray) -> float:
+    """Of the mean of independent values, shape (n,), in their unit; 0 below two."""
+    return (
+        float(values.std(ddof=1)) / math.sqrt(values.size) if values.size > 1 else 0.0
+    )
+
+
 def correlated(residual: FloatArray, group: FloatArray | None = None) -> float:
     """How many neighbouring points err alike, at least 1.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.estimate import Estimate, standard_error
 from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.quantity import plus_minus, printed, show
@@ -65,8 +65,9 @@ def _field_table(run: Measurement) -> Table:
         field = run.field_held(trial) if held else run.field_between(start, end)
         shown = NONE
         if field.size > 1:
-            error = float(field.std(ddof=1)) / field.size**0.5
-            mean = Estimate.of(float(field.mean()), error, field.size - 1)
+            mean = Estimate.of(
+                float(field.mean()), standard_error(field), field.size - 1
+            )
             shown = _with(mean.value, mean.half, "T", 4)
         elif field.size:
             shown = show(float(field[0]), "T", 4)
