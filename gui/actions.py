@@ -106,9 +106,9 @@ class Actions(QObject):
         self._skin_read.connect(self._show_skin)
         self._skin_failed.connect(self._say_skin)
         panels.header.help_asked.connect(lambda: self.show_help())
-        for part, button in self._helped:
+        for part, button, _ in self._helped:
             button.clicked.connect(
-                lambda _=False, part=part: self.show_help(self._topic(part))
+                lambda _=False, part=part: self._help_on(lambda one: one is part)
             )
         panels.header.menu_asked.connect(self.show_menu)
         panels.header.picture_asked.connect(self.copy_picture)
@@ -377,36 +377,27 @@ class Actions(QObject):
         show_studies(self.window, self.panels.theme, roots, opened)
 
     @property
-    def _helped(self) -> list[tuple[QWidget, IconButton]]:
-        """Panels, and the button of each that asks for help on it."""
-        setup, centre, review = (
-            self.panels.setup,
-            self.panels.centre,
-            self.panels.review,
-        )
+    def _helped(self) -> list[tuple[QWidget, IconButton, str]]:
+        """Panels, the button of each that asks for help on it, and its topic now."""
+        setup, centre = self.panels.setup, self.panels.centre
+        review = self.panels.review
+        tab = ("Results", "Runs", "Manual", "Spikes")[review.tab]
         return [
-            (setup, setup.help),
-            (centre.lanes, centre.tools.help),
-            (centre.record, centre.log.help),
-            (review, review.help),
+            (setup, setup.help, "Protocol"),
+            (centre.lanes, centre.tools.help, "Lanes"),
+            (centre.record, centre.log.help, "Steps and log"),
+            (review, review.help, tab),
         ]
 
-    def _topic(self, part: QWidget) -> str:
-        """Of the help, for a panel."""
-        panels = self.panels
-        if part is panels.review:
-            return ("Results", "Runs", "Manual", "Spikes")[panels.review.tab]
-        if part is panels.setup:
-            return "Protocol"
-        return "Lanes" if part is panels.centre.lanes else "Steps and log"
+    def _help_on(self, inside: Callable[[QWidget], bool]) -> None:
+        """Show the help at the panel of which that holds, else its start."""
+        topics = [topic for part, _, topic in self._helped if inside(part)]
+        self.show_help(topics[0] if topics else "")
 
     def _help_here(self) -> None:
         """Show the help at the panel that has the keyboard, else its start."""
         focus = QApplication.focusWidget()
-        inside = [
-            part for part, _ in self._helped if focus and part.isAncestorOf(focus)
-        ]
-        self.show_help(self._topic(inside[0]) if inside else "")
+        self._help_on(lambda part: focus is not None and part.isAncestorOf(focus))
 
     def show_help(self, topic: str = "", page: int = 0) -> None:
         """Show the help: 0 panels, at a topic; 1 shortcuts; 2 about the program."""
