@@ -36,14 +36,19 @@ def steps(far):
     return [change for change in far.changes if change.what == "set"]
 
 
+def play(clock, coil, currents):
+    """Set one after the other, as fast as the source takes them."""
+    for wanted in currents:
+        clock.sleep_until(clock.now() + coil.update_interval)
+        coil.set_current(wanted)
+
+
 def test_plays_a_current_and_reads_it_back(bench):
     clock, _plant, far, coil = bench
     coil.open()
     assert coil.identity.startswith("KEPCO")
     coil.energise()
-    for _ in range(10):
-        clock.sleep_until(clock.now() + coil.update_interval)
-        coil.set_current(0.5)
+    play(clock, coil, [0.5] * 10)
     assert far.setpoint == pytest.approx(0.5)
     clock.sleep_until(clock.now() + 0.2)
     assert coil.read_current().value == pytest.approx(0.5)
@@ -75,9 +80,7 @@ def test_steps_never_exceed_the_slew_limit(bench):
     coil.open()
     coil.energise()
     clock.sleep_until(clock.now() + 5)
-    for wanted in [1.5, 1.5, 1.5, -1.5] * 4:
-        clock.sleep_until(clock.now() + coil.update_interval)
-        coil.set_current(wanted)
+    play(clock, coil, [1.5, 1.5, 1.5, -1.5] * 4)
     coil.safe_off()
     for before, after in itertools.pairwise(steps(far)):
         change = abs(after.value - before.value)
@@ -118,9 +121,7 @@ def test_safe_off_ramps_and_verifies_and_may_be_repeated(bench):
     clock, _plant, far, coil = bench
     coil.open()
     coil.energise()
-    for _ in range(20):
-        clock.sleep_until(clock.now() + coil.update_interval)
-        coil.set_current(1.0)
+    play(clock, coil, [1.0] * 20)
     begun, seen = clock.now(), len(far.changes)
     report = coil.safe_off()
     assert report.verified and report.current == 0.0
@@ -140,9 +141,7 @@ def test_a_hold_is_left_as_fast_as_the_slew_limit_allows(resistor):
     with clock.taking_part("test"):
         coil.open()
         coil.energise()
-        for _ in range(20):
-            clock.sleep_until(clock.now() + coil.update_interval)
-            coil.set_current(1.0)
+        play(clock, coil, [1.0] * 20)
         clock.sleep_until(clock.now() + 1.0)
         begun, seen = clock.now(), len(source.changes)
         report = coil.safe_off()
@@ -162,9 +161,7 @@ def test_heat_budget_trips_and_stays_latched(bench):
     coil.energise()
     begun = clock.now()
     with pytest.raises(InterlockError, match="heat budget"):
-        for _ in range(1000):
-            clock.sleep_until(clock.now() + coil.update_interval)
-            coil.set_current(2.0)
+        play(clock, coil, [2.0] * 1000)
     assert 8.2 < clock.now() - begun < 9.5
     assert not far.output_on
     with pytest.raises(InterlockError):
@@ -178,9 +175,7 @@ def test_an_open_circuit_trips(bench):
     clock, plant, far, coil = bench
     coil.open()
     coil.energise()
-    for _ in range(10):
-        clock.sleep_until(clock.now() + coil.update_interval)
-        coil.set_current(0.5)
+    play(clock, coil, [0.5] * 10)
     plant.resistance = math.inf
     clock.sleep_until(clock.now() + 0.2)
     with pytest.raises(InterlockError, match="open"):
@@ -202,9 +197,7 @@ def test_a_source_that_somebody_else_set_is_not_called_an_open_circuit(
     clock, _plant, far, coil = bench
     coil.open()
     coil.energise()
-    for _ in range(10):
-        clock.sleep_until(clock.now() + coil.update_interval)
-        coil.set_current(0.5)
+    play(clock, coil, [0.5] * 10)
     done(far)
     clock.sleep_until(clock.now() + 0.2)
     with pytest.raises(InterlockError, match=why):

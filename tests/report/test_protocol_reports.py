@@ -149,16 +149,21 @@ def test_monitor_tells_the_distance_to_threshold():
     assert told.sentences[0].endswith("fires at rest cannot be told.")
 
 
-def test_sine_sweep_gives_the_gain_of_small_forces():
-    frequency, cycles = 0.5, 4
+def swung(frequency, amplitude, *, cycles, label, **parameters):
+    """A modelled run of one sine, held all of the time."""
     phase = np.arange(0, 24 * cycles + 1) / 24
-    wave = Waveform(phase / frequency, 0.005 * np.sin(2 * np.pi * phase))
+    wave = Waveform(phase / frequency, amplitude * np.sin(2 * np.pi * phase))
     run = modelled(
-        "sine_sweep", [("0.5 Hz", None, wave, False)], searched=False,
-        parameters={"lowest": 0.5, "highest": 0.5, "count": 1},
+        "sine_sweep", [(label, None, wave, False)], searched=False,
+        parameters=parameters,
     )  # fmt: skip
-    held = (replace(run.trials[0], hold=(0.0, cycles / frequency)),)
-    told = find(replace(run, trials=held)).conclusion
+    trial = replace(run.trials[0], hold=(0.0, cycles / frequency))
+    return replace(run, trials=(trial,))
+
+
+def test_sine_sweep_gives_the_gain_of_small_forces():
+    run = swung(0.5, 0.005, cycles=4, label="0.5 Hz", lowest=0.5, highest=0.5, count=1)
+    told = find(run).conclusion
     (found,) = told.plain["V_C1_over_force"]
     ((frequency_, gain, phase_, *model),) = told.tables[0].rows
     assert frequency_ == "0.5 Hz"
@@ -180,15 +185,11 @@ def test_sine_sweep_gives_the_gain_of_small_forces():
 
 
 def test_a_sine_is_looked_at_with_its_frequency_and_not_with_its_label():
-    frequency, cycles = math.sqrt(0.03 * 0.5), 2
-    phase = np.arange(0, 24 * cycles + 1) / 24
-    wave = Waveform(phase / frequency, 0.01 * np.sin(2 * np.pi * phase))
-    run = modelled(
-        "sine_sweep", [("0.122 Hz", None, wave, False)], searched=False,
-        parameters={"lowest": 0.03, "highest": 0.5, "count": 3},
-    )  # fmt: skip
-    trial = replace(run.trials[0], hold=(0.0, cycles / frequency))
-    (found,) = find(replace(run, trials=(trial,))).conclusion.plain["V_C1_over_force"]
+    frequency = math.sqrt(0.03 * 0.5)
+    run = swung(
+        frequency, 0.01, cycles=2, label="0.122 Hz", lowest=0.03, highest=0.5, count=3
+    )
+    (found,) = find(run).conclusion.plain["V_C1_over_force"]
     # Eqs. (7), (8) and (16), small signal; by 0.122 Hz it was 0.07 rad off
     circuit, turn = Circuit(), 2 * np.pi * frequency
     resistance = 1 / (1 / circuit.R1 + 1 / circuit.R2)
@@ -196,7 +197,9 @@ def test_a_sine_is_looked_at_with_its_frequency_and_not_with_its_label():
     late = math.atan(turn * resistance * circuit.C1)
     assert found["frequency_Hz"] == pytest.approx(frequency)
     assert found["phase_rad"]["value"] == pytest.approx(leak - late - np.pi, abs=5e-3)
-    assert run.applied_edge(trial) == 0.0, "a sine is at no level that it comes to"
+    assert run.applied_edge(run.trials[0]) == 0.0, (
+        "a sine is at no level that it comes to"
+    )
 
 
 def test_what_a_report_says_of_adaptation_finds_its_run(tmp_path):
