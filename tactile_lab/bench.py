@@ -85,6 +85,23 @@ class Reading:
 
 
 @dataclass(frozen=True)
+class Lowered:
+    """One set-point that a source took on its way to 0 A.
+
+    Attributes:
+        asked: clock time at which the source was addressed, s.
+        heard: clock time at which it had answered, s.
+        acted: clock time at which its answer set out, s.
+        setpoint: A.
+    """
+
+    asked: float
+    heard: float
+    acted: float
+    setpoint: float
+
+
+@dataclass(frozen=True)
 class OffReport:
     """How a `safe_off` ended.
 
@@ -92,11 +109,13 @@ class OffReport:
         verified: the read-back showed 0 A and the output off.
         current: current read back, A; None if it could not be read.
         text: what happened, for a person.
+        fall: set-points on the way, the last of them 0 A where that was taken.
     """
 
     verified: bool
     current: float | None
     text: str
+    fall: tuple[Lowered, ...] = ()
 
 
 @dataclass(frozen=True)

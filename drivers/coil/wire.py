@@ -9,7 +9,7 @@ import math
 import statistics
 
 from drivers.serial_line.source_wire import RECONNECT, VERIFICATIONS, SourceWire
-from tactile_lab.bench import OffReport
+from tactile_lab.bench import Lowered, OffReport
 from tactile_lab.errors import BadReplyError, TactileLabError
 from tactile_lab.instruments.serial_dialect import MARGIN, CoilDialect
 from tactile_lab.quantity import show
@@ -113,12 +113,13 @@ class CoilWire(SourceWire[CoilDialect]):
             ramp: False goes to 0 A at once.
         """
         trouble: list[str] = []
+        fall: list[Lowered] = []
         if not self.reconnected(trouble, RECONNECT):
             return OffReport(False, None, UNKNOWN + " | ".join(trouble))
         if ramp and setpoint != 0.0:
-            self._ramp_down(setpoint, rested, slew, exchange, trouble)
+            self._ramp_down(setpoint, rested, slew, exchange, trouble, fall)
         row = self.dialect
-        steps = (*row.stop_lines, row.set_line(0.0), *row.off)
+        zero = (*row.stop_lines, row.set_line(0.0))
         current: float | None = None
         disobeys = False
         for left in reversed(range(VERIFICATIONS)):
@@ -126,7 +127,10 @@ class CoilWire(SourceWire[CoilDialect]):
                 break
             if disobeys:  # somebody may have put it under its front panel's control
                 self.offer(row.optional)
-            taken = self.insist(steps, trouble)
+            asked = self.link.now
+            if taken := self.insist(zero, trouble):
+                fall.append(Lowered(asked, self.link.now, self.acted, 0.0))
+            taken = self.insist(row.off, trouble) and taken
             self.link.pause(SETTLE)
             try:
                 on = self.output_is_on()
@@ -141,10 +145,12 @@ class CoilWire(SourceWire[CoilDialect]):
                     continue  # off, but the set-point may be another than 0 A
                 text = f"Output off, {show(current, 'A')} read back."
                 text += "" if taken else DOUBT
-                return OffReport(True, current, f"{text} {self.link.moved}".strip())
+                text = f"{text} {self.link.moved}".strip()
+                return OffReport(True, current, text, tuple(fall))
             disobeys, state = True, "on" if on else "off"
             trouble.append(f"read-back: output {state}, {show(current, 'A')}")
-        return OffReport(False, current, UNKNOWN + " | ".join(dict.fromkeys(trouble)))
+        text = UNKNOWN + " | ".join(dict.fromkeys(trouble))
+        return OffReport(False, current, text, tuple(fall))
 
     def _taken_over(self) -> float:
         """Set-point to ramp down from, A, once a list that may be playing ended."""
@@ -163,6 +169,7 @@ class CoilWire(SourceWire[CoilDialect]):
         slew: float,
         exchange: float,
         trouble: list[str],
+        fall: list[Lowered],
     ) -> None:
         """Steps until 0 A is one step away, at the slew limit; ended by a failure.
 
@@ -189,6 +196,7 @@ class CoilWire(SourceWire[CoilDialect]):
                 current = math.copysign(left, current)
                 self.set_current(current)
                 answered = self.link.now
+                fall.append(Lowered(sent, answered, self.acted, current))
                 exchange = answered - sent
         except TactileLabError as reason:
             trouble.append(f"ramp: {reason}")

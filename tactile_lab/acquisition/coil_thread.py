@@ -234,9 +234,14 @@ class CoilThread(InstrumentThread):
             self.generator.ramp_down(self.coil.beat)
         asked, last = self.clock.now(), self.last
         self.off = self.coil.safe_off()
-        flowed = last is not None and abs(last.setpoint) > RESOLUTION
-        if flowed and self.off.verified:  # it fell from there
-            self._note(Applied(asked, self.clock.now(), 0.0, self.off.current))
+        if last is not None and abs(last.setpoint) > RESOLUTION:  # it fell from there
+            for one in self.off.fall:
+                asked, answered = one.asked, one.acted
+                self._note(
+                    Applied(asked, one.heard, one.setpoint, None, answered=answered)
+                )
+            if self.off.verified:
+                self._note(Applied(asked, self.clock.now(), 0.0, self.off.current))
         self.switched_on = self.live = False
         try:
             if self.off.verified and self.opened:

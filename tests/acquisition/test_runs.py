@@ -207,6 +207,13 @@ def test_a_trial_that_was_cut_short_is_reported_with_all_its_spikes(run_scene, s
         assert run.axis.time_of(float(run.samples)) > run.stopped + 0.1
         assert run.current["setpoint"][-1] == 0.0
         current = run.signal("coil_current")
+        # in steps at the slew limit, and the shunt saw each
+        fall = run.current[run.current["time"] > run.stopped]
+        steps = fall[np.append(np.diff(fall["setpoint"]) < 0, False)]
+        assert len(steps) >= 2
+        for time, setpoint, *_ in steps:
+            seen = current[round(1e6 * (time + 0.02)) :][:1000]
+            assert np.mean(seen) == pytest.approx(setpoint, abs=0.01)
         before = current[: round(1e6 * run.stopped)]
         assert abs(np.mean(current[-100:])) < 0.02 * abs(np.mean(before[-100:]))
     assert trial.hold[1] == pytest.approx(trial.duration)
