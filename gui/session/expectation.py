@@ -33,7 +33,8 @@ class Expectation:
         needs: what it opens and keeps.
         estimate: its cost.
         preview: what the model expects.
-        warnings: where the bench cannot deliver what is asked.
+        warnings: where the run would not be what is asked for.
+        assumptions: what its numbers rest on.
     """
 
     record: Record
@@ -41,6 +42,7 @@ class Expectation:
     estimate: Cost
     preview: Preview
     warnings: tuple[str, ...]
+    assumptions: tuple[str, ...]
 
 
 def plan_request(engine: Engine, request: Request) -> Expectation:
@@ -63,6 +65,7 @@ def expect(scene: Scene) -> Expectation:
         estimate=made.estimate,
         preview=_preview(made),
         warnings=made.warnings,
+        assumptions=made.assumptions,
     )
 
 

@@ -49,8 +49,9 @@ SETTLE = 250
 """Milliseconds without a keystroke before the plan is computed anew."""
 
 
-WARNINGS = 3
-"""Warnings shown; the tool tip has them all."""
+WARNINGS, TALL = 3, 800
+"""Warnings shown where the panel is so high, px, else one; the tool tip has them all,
+and the log as the run begins."""
 
 
 class SetupPanel(QFrame):
@@ -80,6 +81,7 @@ class SetupPanel(QFrame):
         self.tables = Sections(theme, self.form.edits)
         self.warnings = label("", "warning", wrap=True)
         self.warnings.hide()
+        self.rests_on = label("", "small", wrap=True)
         self.subject = Subject(session, self.form, self.tables)
         self.star = PresetButton(
             theme, self.form, session.out.resolve().parent / "presets", self.request
@@ -264,6 +266,7 @@ class SetupPanel(QFrame):
         if expectation is not None:
             self.preview.show_preview(expectation.preview)
             self._show_warnings(expectation.warnings)
+            say(self.rests_on, _listed(expectation.assumptions))
             self.estimate.show_estimate(expectation.estimate)
         self.render_snapshot(self._snapshot)
         then, self._once_planned = self._once_planned, None
@@ -320,8 +323,11 @@ class SetupPanel(QFrame):
         say(self.strip, words)
 
     def _show_warnings(self, warnings: Sequence[str]) -> None:
-        """Show where the bench cannot deliver what is asked."""
-        say(self.warnings, "\n".join(f"⚠ {text}" for text in warnings[:WARNINGS]))
+        """Show where the run would not be what is asked for."""
+        shown = warnings[: WARNINGS if self.height() >= TALL else 1]
+        left = len(warnings) - len(shown)
+        more = f" (and {left} more)" if left else ""
+        say(self.warnings, "\n".join(f"⚠ {text}" for text in shown) + more)
         self.warnings.setToolTip("\n".join(warnings))
 
     def _page(self) -> QScrollArea:
@@ -330,7 +336,8 @@ class SetupPanel(QFrame):
         caption = row(label("WAVEFORM", "section"), STRETCH, axes, spacing=6)
         inner, title = QWidget(), label("PARAMETERS", "section")
         force = (self.about, caption, self.preview)
-        asked = (title, self.form, self.tables, self.warnings)
+        rests_on = (label("NUMBERS REST ON", "section"), self.rests_on)
+        asked = (title, self.form, self.tables, *rests_on)
         inside = column(inner, *force, *asked, STRETCH, spacing=9)
         return with_gutter(scrolling(inner), inside)
 
@@ -351,6 +358,7 @@ class SetupPanel(QFrame):
             page,
             self.queue,
             self.problem,
+            self.warnings,
             line(),
             self.estimate,
             self.buttons,
@@ -358,3 +366,8 @@ class SetupPanel(QFrame):
         )
         whole = stack(self, parts, page)
         whole.setContentsMargins(14, 10, 14 - SCROLL_BAR, 12)
+
+
+def _listed(texts: Sequence[str]) -> str:
+    """Sentences that begin as headings do, one a line."""
+    return "\n".join(f"{text[:1].upper()}{text[1:]}" for text in texts)

@@ -1,4 +1,4 @@
-"""Where a scene cannot deliver what it asks for: warnings, and stated assumptions."""
+"""Where a run would not be what its scene asks for, and what its numbers rest on."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ FINE = 0.01
 
 
 def warnings(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]:
-    """Everything worth a person's attention before the run."""
+    """What a person should change, or know, before a run; no scene has one for good."""
     return (
         *drive.warnings,
         *_ways(scene, drive),
@@ -44,7 +44,7 @@ def warnings(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]:
         *_noise(scene, needed, drive.streamed),
         *_scope(scene, needed),
         *_field(scene, needed, drive),
-        *_magnet(scene),
+        *(() if scene.bench.simulated else _magnet(scene)),
         *_exchanged(scene, needed),
     )
 
@@ -142,8 +142,15 @@ def _spike_sampling(scene: Scene, needed: Needs) -> Iterator[str]:
             f"takes {show(interval, 's')}. Sample at "
             f"{show(_round_up(2 / width), 'S/s')} or faster."
         )
-    elif interval > scene.circuit.tau_K / SAMPLES_PER_DECAY:
-        decay = scene.circuit.tau_K
+
+
+def _amplitudes(scene: Scene, needed: Needs) -> Iterator[str]:
+    """That spikes are counted and timed well, but not seen whole."""
+    rate, decay = scene.record.sample_rate, scene.circuit.tau_K
+    interval = 1 / rate
+    if needed.detect_on == "V_K" and (
+        decay / SAMPLES_PER_DECAY < interval <= spike_width(scene)
+    ):
         yield (
             f"V_K at {show(rate, 'S/s')} gives counts and times to "
             f"±{show(interval, 's')}, not amplitudes: a spike decays in "
@@ -270,6 +277,9 @@ def assumptions(scene: Scene, needed: Needs) -> tuple[str, ...]:
             f"B1 = {show(magnet.B1, 'T')}, B2 = {show(magnet.B2_per_ampere, 'T')} "
             f"per ampere: {per_ampere}"
         ]
+    # on a real bench it is a warning: the core may be another than the printed one
+    lines += _magnet(scene) if bench.simulated else ()
+    lines += _amplitudes(scene, needed)
     lines += _followers(scene)
     if magnet.coil_lag or magnet.eddy_lag:
         known = _band(magnet.lag_uncertainty, "s")

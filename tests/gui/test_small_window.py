@@ -164,3 +164,20 @@ def test_the_card_of_the_empty_state_grows_with_what_it_offers(app) -> None:
     (recent,) = (one for one in card.findChildren(QPushButton) if "14:03" in one.text())
     assert recent.isVisible() and cut(card) == []
     below.close()
+
+
+def test_what_the_plan_warns_of_is_seen_below_a_long_form(lab, small, tmp_path) -> None:
+    """It stood below the last field: who did not scroll down was told nothing."""
+    scene = tmp_path / "sparse.toml"
+    scene.write_text(
+        '[protocol]\nname = "pulses"\n[record]\nsample_rate = "100 kS/s"\n'
+    )
+    window = lab.window
+    window.screen_.open_scene(str(scene))
+    lab.session.plan.expectation = None
+    lab.until(lambda: lab.session.plan.expectation is not None)
+    told = window.setup.warnings
+    assert "misses about" in told.text()
+    lab.app.processEvents()
+    assert told.visibleRegion().boundingRect() == told.rect(), "all of it is in sight"
+    assert cut(window.setup) == []

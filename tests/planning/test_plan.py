@@ -80,10 +80,20 @@ def warned(*overrides):
     return " ".join(plan(load(None, overrides), preview=False).warnings)
 
 
+def assumed(*overrides):
+    return " ".join(plan(load(None, overrides), preview=False).assumptions)
+
+
 def test_amplitudes_need_a_faster_rate():
-    told = warned("record.sample_rate=1 MS/s")
+    told = assumed("record.sample_rate=1 MS/s")
     assert "counts and times to ±1 µs, not amplitudes" in told
-    assert "not amplitudes" not in warned("record.sample_rate=5 MS/s")
+    assert "not amplitudes" not in assumed("record.sample_rate=5 MS/s")
+    assert "not amplitudes" not in assumed("record.sample_rate=0.2 MS/s"), "none seen"
+
+
+def test_nothing_warns_for_good():
+    """The demo had two warnings whatever was done: who always sees them reads none."""
+    assert warned() == ""
 
 
 def test_a_rate_that_misses_spikes_is_warned_of():
@@ -109,10 +119,18 @@ def test_spikes_that_never_reach_the_threshold_are_warned_of():
     assert "no spike is high enough" in warned("detect.threshold=4 V")
 
 
-def test_the_printed_a2_is_warned_of_and_a_real_core_is_not():
-    assert "Table 1's value as printed" in warned()
-    real = warned("bench.magnet.A2=2.25e-4 m^2", 'protocol.levels=["10 mN"]')
+def test_the_printed_a2_is_told_and_a_real_core_is_not():
+    assert "Table 1's value as printed" in assumed()
+    real = assumed("bench.magnet.A2=2.25e-4 m^2", 'protocol.levels=["10 mN"]')
     assert "printed" not in real
+
+
+def test_a_real_bench_is_warned_of_the_printed_a2(tmp_path):
+    """There the force may be a tenth; the simulated core is the printed one."""
+    bench = tmp_path / "bench.toml"
+    bench.write_text('[coil]\nport = "/dev/null"\nbaud = 19200\n[magnet]\nr = "6 mm"\n')
+    made = plan(load(None, ['record.signals=["force"]'], bench=bench), preview=False)
+    assert any("Table 1's value as printed" in text for text in made.warnings)
 
 
 def test_a_real_core_refuses_the_demo_and_names_what_it_reaches():

@@ -80,7 +80,7 @@ def test_csv_says_what_the_run_was_and_when_it_held(run, tmp_path):
     assert about["force source"].startswith("derived: by the run's calibration")
     assert about["force uncertainty"] == "not stated"
     assert about["loss"].startswith("0 of ")
-    told = [text for key, text in about.items() if key.startswith("warning ")]
+    told = [text for key, text in about.items() if key.startswith("assumption ")]
     assert any("Table 1's value as printed" in text for text in told)
     assert about["assumption 1"].startswith("force from Eq. (2)")
     assert float(about["V_C1 one code V"]) == run.signal("V_C1").gain
