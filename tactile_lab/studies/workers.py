@@ -18,7 +18,8 @@ from concurrent.futures import (
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
-from multiprocessing import parent_process
+from multiprocessing import Pipe, parent_process
+from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for
 from pathlib import Path
 from threading import Thread
@@ -228,19 +229,34 @@ def workers(
         yield InProcess(points, shelf)
     else:
         count = count or os.cpu_count() or 1
-        yield Pool(lambda: _processes(count), study, points.runs, shelf, count)
+        yield Pool(lambda: _Processes(count), study, points.runs, shelf, count)
 
 
-def _processes(count: int) -> Executor:
-    return ProcessPoolExecutor(count, initializer=_end_with_parent)
+class _Processes(ProcessPoolExecutor):
+    """Processes of this machine, which end when it is shut down or killed.
+
+    A shut-down executor tells its workers through a queue, the lock of which one that
+    was killed may have held: the others would wait for it without end. So they are told
+    beside it.
+    """
+
+    def __init__(self, count: int) -> None:
+        told, self._tell = Pipe(duplex=False)
+        super().__init__(count, initializer=_end_when, initargs=(told,))
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the workers, whatever they are at."""
+        super().shutdown(wait=False, cancel_futures=cancel_futures)
+        self._tell.send_bytes(b"end")  # nobody takes it out: all of them see it
+        super().shutdown(wait=wait)
 
 
-def _end_with_parent() -> None:
-    """Let this process end when the one that began it is killed."""
+def _end_when(told: Connection) -> None:
+    """Let this process end when it is told to, or the one that began it is killed."""
     parent = parent_process()
     if parent is not None:
-        sentinel = parent.sentinel
-        Thread(target=lambda: (wait_for([sentinel]), os._exit(1)), daemon=True).start()
+        ends: list[Connection | int] = [told, parent.sentinel]
+        Thread(target=lambda: (wait_for(ends), os._exit(1)), daemon=True).start()
 
 
 @lru_cache(maxsize=2)

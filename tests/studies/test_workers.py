@@ -135,6 +135,32 @@ def test_a_worker_that_is_killed_is_replaced(tmp_path: Path) -> None:
     assert hit and same(found, done(asked, tmp_path / "alone")[0])
 
 
+@pytest.mark.parametrize("killed", [0, 1])
+def test_the_last_worker_ends_though_another_was_killed_as_it_waited(
+    tmp_path: Path, killed: int
+) -> None:
+    """One of the two holds the lock of the queue through which both are told to end."""
+    asked = load_study({**LEVELS, "draw": {"points": 100}})
+    others, workers = multiprocessing.active_children(), []
+
+    def tell(progress: StudyProgress) -> None:
+        if progress.done == progress.total:
+            now = multiprocessing.active_children()
+            workers.extend(one for one in now if one not in others)
+            for worker in workers:
+                os.kill(worker.pid, signal.SIGSTOP)
+                os.waitpid(worker.pid, os.WUNTRACED)  # till it has stopped
+
+    carry_out(asked, tmp_path, count=2, tell=tell)
+    gone, left = workers[killed], workers[1 - killed]
+    gone.kill()
+    os.kill(left.pid, signal.SIGCONT)
+    left.join(30)
+    ended = not left.is_alive()
+    left.kill()
+    assert ended
+
+
 def test_workers_answer_so_briefly_that_no_kill_leaves_half_an_answer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
