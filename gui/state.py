@@ -131,7 +131,8 @@ class Snapshot:
         state: the window's state.
         bench: name of the bench, "" without one.
         simulated: whether the bench is simulated.
-        title: second line of the identity.
+        title: of the run or whatever else is on screen; "" before any.
+        opened: how many runs from disk are on screen.
         coil: what is known about the coil; None without a coil source.
         instruments: chips, in order; only those the scene uses.
         elapsed: run time reached, s.
@@ -144,7 +145,8 @@ class Snapshot:
     state: WindowState = WindowState.DISCONNECTED
     bench: str = ""
     simulated: bool = False
-    title: str = "No bench connected"
+    title: str = ""
+    opened: int = 0
     coil: CoilView | None = None
     instruments: tuple[InstrumentView, ...] = field(default=())
     elapsed: float = 0.0
@@ -152,6 +154,13 @@ class Snapshot:
     manual: bool = False
     known: bool = True
     fault: FaultNotice | None = None
+
+    @property
+    def heading(self) -> str:
+        """What is looked at, for a person."""
+        if self.opened:
+            return f"{'Looking at' if self.opened == 1 else 'Comparing'} {self.title}"
+        return self.title or self.bench or "No bench connected"
 
 
 def truth(state: WindowState, coil: CoilView | None) -> CoilKnowledge:

@@ -106,7 +106,7 @@ class Window(QMainWindow):
         """Render everything from the session's snapshot."""
         snapshot = self.session.snapshot()
         self.header.render_snapshot(snapshot)
-        named = dict.fromkeys((snapshot.title, snapshot.bench, "Tactile Lab"))
+        named = dict.fromkeys((snapshot.heading, snapshot.bench, "Tactile Lab"))
         self.setWindowTitle(" · ".join(name for name in named if name))
         self.banner.show_fault(snapshot.fault)
         self.setup.render_snapshot(snapshot)

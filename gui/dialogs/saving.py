@@ -79,7 +79,7 @@ def write_view(panels: Panels, run: Source | None, path: Path) -> None:
     simulated = panels.session.bench.spec is None or panels.session.bench.spec.simulated
     if run is not None:
         simulated = run.simulated
-    title = panels.session.name.removeprefix("Looking at ") or "plan"
+    title = panels.session.name or "plan"
     bar = panels.centre.compare_bar
     if run is not None and bar.comparison is run:
         title += f", {bar.comparison.layout.value}"

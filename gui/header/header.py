@@ -144,10 +144,9 @@ class Header(QFrame):
     def render_snapshot(self, snapshot: Snapshot) -> None:
         """Render identity, chips, clock and STOP."""
         self.badge.setVisible(snapshot.simulated)
-        run = next((word for word in snapshot.title.split() if "_" in word), "")
-        self._title.set_whole(snapshot.title, end=run)
+        self._title.set_whole(snapshot.heading, end=snapshot.title)
         bench = f"Bench: {snapshot.bench}" if snapshot.bench else "No bench"
-        self._title.setToolTip(f"{snapshot.title}\n{bench}")
+        self._title.setToolTip(f"{snapshot.heading}\n{bench}")
         while len(self._chips) < len(snapshot.instruments):
             chip = Chip()
             self._chips.append(chip)

@@ -200,7 +200,7 @@ class Screen(QObject):
         self.results.forget()
         if self._records.leave():
             self._panels.centre.compare_bar.show_comparison(None)
-            self._panels.session.opened = ""
+            self._panels.session.opened = ()
         self._panels.centre.say("")
 
     def forget(self, folder: Path) -> None:
@@ -322,7 +322,7 @@ class Screen(QObject):
         if not self._may_show(source, "old runs open"):
             return
         panels = self._panels
-        panels.session.opened = f"Looking at {source.path.name}"
+        panels.session.opened = (source.path.name,)
         panels.centre.view.clear_cursors()
         panels.centre.show_source(source, self._lanes())
         status = str(source.info.get("status")).capitalize()
@@ -355,11 +355,11 @@ class Screen(QObject):
     def _show_comparison(self, comparison: Comparison) -> None:
         if not self._may_show(comparison, "runs are compared"):
             return
-        self._panels.session.opened = f"Comparing {len(comparison.members)} runs"
+        names = tuple(member.name for member in comparison.members)
+        self._panels.session.opened = names
         self._panels.centre.compare_bar.show_comparison(comparison)
         self._panels.centre.show_source(comparison, self._lanes())
-        name = comparison.members[0].name
-        self._show_steps(comparison.first, f"Steps of {MARKS[0]} {name}")
+        self._show_steps(comparison.first, f"Steps of {MARKS[0]} {names[0]}")
         self.changed.emit()
 
     def _count_from(self, level: float) -> None:

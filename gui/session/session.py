@@ -55,7 +55,7 @@ class Session(QObject):
         plan: of what the form asks for.
         queue: of runs.
         run, monitor, manual: what uses the bench, one at a time.
-        opened: what was opened from disk and is on screen, "" while nothing is.
+        opened: names of the runs from disk that are on screen, () while none is.
         source: what is seen live: the run in progress or the last one, or the monitor.
         unkept: what that is where it is no run, also after its end; "" for a run.
     """
@@ -87,7 +87,7 @@ class Session(QObject):
             lambda item: self.start(item.request, item.title, item.expectation),
         )
         self._chips = Chips(self.status, self.bench, self.run, self.monitor)
-        self.opened = ""
+        self.opened: tuple[str, ...] = ()
         self.source: LiveSource | None = None
         self.unkept = ""
         self._after_monitor: tuple[Request, str, Expectation | None] | None = None
@@ -236,7 +236,9 @@ class Session(QObject):
     @property
     def name(self) -> str:
         """Of what is on screen: opened from disk, else seen live; "" before any."""
-        return self.opened or self.unkept or self.run.name
+        if len(self.opened) > 1:
+            return f"{len(self.opened)} runs"
+        return "".join(self.opened) or self.unkept or self.run.name
 
     @property
     def busy(self) -> bool:
@@ -257,14 +259,13 @@ class Session(QObject):
     def snapshot(self) -> Snapshot:
         """Everything the header, banner and buttons are rendered from."""
         coil, spec = self.coil_view(), self.bench.spec
-        name = "No bench connected" if spec is None else spec.name
-        if self.name and self.state is not WindowState.DISCONNECTED:
-            name = self.name
+        seen = self.state is not WindowState.DISCONNECTED
         return Snapshot(
             state=self.state,
             bench="" if spec is None else spec.name,
             simulated=spec is not None and spec.simulated,
-            title=name,
+            title=self.name if seen else "",
+            opened=len(self.opened) if seen else 0,
             coil=coil,
             instruments=self._chips.views(self.plan_on_screen, coil),
             elapsed=self.run.elapsed,

@@ -55,7 +55,7 @@ def test_a_note_before_a_run_goes_to_that_run(lab) -> None:
 def test_a_note_beside_an_old_run_is_kept_with_that_run(lab) -> None:
     window, folder = lab.window, lab.runs(1)[0]
     window.screen_.open_run(folder)
-    lab.until(lambda: lab.session.opened == f"Looking at {folder.name}")
+    lab.until(lambda: lab.session.opened == (folder.name,))
     assert "on the run on screen" in window.centre.log.note.placeholderText()
     window.centre.view.place_cursors(0.25, 0.5)
     type_note(lab, "odd spike")
@@ -125,7 +125,7 @@ def test_a_run_that_was_cut_short_is_recovered_in_the_window(lab) -> None:
     assert card.entry.status == "cut short"
     QTest.mouseClick(card, Qt.MouseButton.LeftButton)
     runs.recover.click()
-    lab.until(lambda: lab.session.opened == f"Looking at {cut.name}")
+    lab.until(lambda: lab.session.opened == (cut.name,))
     with Run.load(cut) as run:
         assert run.status == "recovered" and run.duration > 0.5
 

@@ -54,7 +54,7 @@ def test_keys_go_from_spike_to_spike(lab) -> None:
     (folder,) = lab.runs(1)
     window, view = lab.window, lab.window.centre.view
     window.screen_.open_run(folder)
-    lab.until(lambda: window.session.opened == f"Looking at {folder.name}")
+    lab.until(lambda: window.session.opened == (folder.name,))
     spikes = window.screen_.run.spikes
     window.actions_._tab(3)
     view.show_span(0.0, 0.2)
@@ -75,7 +75,7 @@ def test_cards_tell_statistics_between_the_cursors(lab) -> None:
     (folder,) = lab.runs(1)
     window, view = lab.window, lab.window.centre.view
     window.screen_.open_run(folder)
-    lab.until(lambda: window.session.opened == f"Looking at {folder.name}")
+    lab.until(lambda: window.session.opened == (folder.name,))
     row = window.centre.stack.row("V_C1")
     view.place_cursors(0.4, 0.2)
     lab.until(lambda: row.statistics is not None)
@@ -94,7 +94,7 @@ def test_a_level_of_V_K_becomes_the_threshold_of_the_next_run(lab) -> None:
     (folder,) = lab.runs(1)
     window, form = lab.window, lab.window.setup.tables.form("detect")
     window.screen_.open_run(folder)
-    lab.until(lambda: window.session.opened == f"Looking at {folder.name}")
+    lab.until(lambda: window.session.opened == (folder.name,))
     assert window.screen_.run.threshold == pytest.approx(0.5, abs=0.01)
     before = form.texts()
     window.centre.stack.threshold_asked.emit(0.8)

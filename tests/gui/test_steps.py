@@ -13,7 +13,7 @@ def opened(lab):
     (folder,) = lab.runs(1)
     window = lab.window
     window.screen_.open_run(folder)
-    lab.until(lambda: window.session.opened == f"Looking at {folder.name}")
+    lab.until(lambda: window.session.opened == (folder.name,))
     window.centre.view.show_all()
     return window, [one for one in window.screen_.run.holds if not one.pause]
 

@@ -45,7 +45,7 @@ def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
     window = lab.window
     folder = lab.runs(1)[0]
     window.screen_.open_run(folder)
-    lab.until(lambda: window.session.opened == f"Looking at {folder.name}")
+    lab.until(lambda: window.session.opened == (folder.name,))
     said = window.centre.notice
     window.review.results.report_asked.emit()
     assert said.text() == f"There is no report.html in {folder}."
