@@ -39,18 +39,24 @@ FOLLOWED = 5.0
 
 
 class EmptyCard(QFrame):
-    """What to do where there is no bench: simulated, connect, open, recent."""
+    """What to do where there is no bench: simulated, connect, open, recent.
+
+    Args:
+        parent: what it lies on.
+        above: what it leaves free at the foot of that.
+        theme: of the window.
+    """
 
     simulated_asked = Signal()
     connect_asked = Signal()
     open_asked = Signal()
     recent_asked = Signal(object)
 
-    def __init__(self, parent: QWidget, theme: Theme) -> None:
+    def __init__(self, parent: QWidget, above: QWidget, theme: Theme) -> None:
         super().__init__(parent)
         self.setProperty("role", "dialog")
         self.setAccessibleName("No bench connected")
-        self._below, self._theme = parent, theme
+        self._below, self._above, self._theme = parent, above, theme
         self._picture = QLabel()
         title = label("No bench connected", "big")
         self._text = text = label(
@@ -101,7 +107,10 @@ class EmptyCard(QFrame):
         self.setFixedWidth(min(MOST, below.width() - 16))
         for part in minor:
             part.show()
-        room = below.height() - 16
+        height = below.height()
+        if self._above.isVisible():
+            height -= self._above.height()
+        room = height - 16
         for part in minor:
             if self._wanted_height() <= room:
                 break
@@ -109,7 +118,7 @@ class EmptyCard(QFrame):
         self.setFixedHeight(min(self._wanted_height(), room))
         self.move(
             (below.width() - self.width()) // 2,
-            max((below.height() - self.height()) // 2, 8),
+            max((height - self.height()) // 2, 8),
         )
         self.raise_()
 
@@ -179,7 +188,7 @@ class Centre(QWidget):
         self._low = False
         self.show_room(NARROW, LOW)
         column(self).addWidget(self.splitter)
-        self.empty = EmptyCard(self.stack, theme)
+        self.empty = EmptyCard(self.stack, self.stack.navigator, theme)
         self.progress.blocks.chosen.connect(self.view.show_step)
         self.log.step_chosen.connect(self._show_step)
 

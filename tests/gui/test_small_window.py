@@ -140,13 +140,17 @@ def test_the_bar_of_a_comparison_fits(lab, host) -> None:
 @pytest.mark.parametrize("room", [(BAR, 170), (BAR, 600), (1100, 700)])
 def test_the_card_of_the_empty_state_fits(app, room: tuple[int, int]) -> None:
     below = QWidget()
-    below.resize(*room)
-    card = EmptyCard(below, Theme("light"))
+    width, height = room
+    below.resize(width, height + 60)
+    whole_run = QWidget(below)
+    whole_run.setGeometry(0, height, width, 60)
+    card = EmptyCard(below, whole_run, Theme("light"))
     card.show_recent([("Pulses · today 14:03 · complete", Path())] * 4)
     below.show()
     card.place()
     app.processEvents()
     assert below.rect().contains(card.geometry())
+    assert not card.geometry().intersects(whole_run.geometry())
     assert cut(card) == [] and card.simulated.isVisible()
     below.close()
 
@@ -155,7 +159,7 @@ def test_the_card_of_the_empty_state_grows_with_what_it_offers(app) -> None:
     """Runs are listed after the window has appeared."""
     below = QWidget()
     below.resize(930, 440)
-    card = EmptyCard(below, Theme("light"))
+    card = EmptyCard(below, QWidget(below), Theme("light"))
     below.show()
     card.place()
     app.processEvents()
