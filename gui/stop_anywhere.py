@@ -98,11 +98,19 @@ class StopAnywhere(QObject):
         if held and (stops or _written(event) in self._once):
             event.accept()  # and so it is not asked for as a shortcut either
             return True  # what it first meant was done
+        if event.type() == QEvent.Type.ShortcutOverride and self._is_ours(event):
+            event.ignore()
+            return True  # a field on X11 takes Ctrl+E, and means the end of its line
         if not stops or event.type() != QEvent.Type.KeyPress:
             return False
         if event.key() == Qt.Key.Key_F12:
             return self._act("STOP by F12")
         return self._escape(watched)
+
+    def _is_ours(self, event: QKeyEvent) -> bool:
+        """Whether a key with Ctrl is the window's, wherever the keyboard is."""
+        held = event.modifiers() & Qt.KeyboardModifier.ControlModifier
+        return bool(held) and _written(event) in self._once
 
     def _act(self, reason: str) -> bool:
         self._session.stop(reason)
