@@ -62,14 +62,11 @@ class RunResults(QObject):
 
     def begin(self, steps: int, *, fires: bool) -> None:
         """A run of so many steps begins; `fires`: its spikes are looked for."""
-        self.steps, self.folder, self._whole = [], None, False
-        self._elsewhere = False
-        self._total = steps
-        self._view.show_kind(fires=fires)
-        self._view.show_facts("", report=False)
-        self._view.show_statements(())
-        self._show(running=True)
-        self._fit(None)
+        self._empty(steps, fires=fires, running=True)
+
+    def clear(self) -> None:
+        """Of what is on screen there is nothing to tell: it is no run, or several."""
+        self._empty(0, fires=True, running=False)
 
     def step(self, outcome: Outcome, source: LiveSource | None) -> None:
         """A step has ended."""
@@ -119,11 +116,13 @@ class RunResults(QObject):
             self._conclude(source.path)
 
     def recorded(self, source: RunSource) -> None:
-        """The record of the run on screen is there: with the step that was cut short.
+        """The record of the last run is there, which is on screen, or again.
 
-        Live, only what has come to its end is told.
+        Live, only what has come to its end is told: not a step that was cut short.
         """
-        if source.path == self.folder and len(of_run(source)) > len(self.steps):
+        if source.path != self.folder:
+            self.stored(source)
+        elif len(of_run(source)) > len(self.steps):
             self.steps = of_run(source)
             self._show(running=False)
             self._fit(source)
@@ -138,6 +137,16 @@ class RunResults(QObject):
         self._next = None
         self.agreed.emit(None)
         self.fitted.emit([])
+
+    def _empty(self, steps: int, *, fires: bool, running: bool) -> None:
+        self.steps, self.folder, self._whole = [], None, False
+        self._elsewhere = False
+        self._total = steps
+        self._view.show_kind(fires=fires)
+        self._view.show_facts("", report=False)
+        self._view.show_statements(())
+        self._show(running=running)
+        self._fit(None)
 
     def _show_fit(self, found: Fit | None) -> None:
         self._view.show_fit(found)

@@ -188,6 +188,8 @@ class Screen(QObject):
     def close_run(self) -> None:
         """Go back from a run on disk to the session's last run, or to the plan."""
         self.leave_run()
+        if self.results.folder != self._ended:
+            self.results.clear()
         source, centre = self._panels.session.source, self._panels.centre
         if source is not None and centre.stack.source is not source:
             centre.show_source(source, self._lanes())
@@ -239,6 +241,8 @@ class Screen(QObject):
             steps = sum(not hold.pause for hold in holds)
             searched = expectation is None or expectation.needs.detect_on is not None
             self.results.begin(steps, fires=searched)
+        else:
+            self.results.clear()
         self.changed.emit()
 
     def trial_ended(self, outcome: Outcome) -> None:
@@ -357,6 +361,7 @@ class Screen(QObject):
             return
         names = tuple(member.name for member in comparison.members)
         self._panels.session.opened = names
+        self.results.clear()
         self._panels.centre.compare_bar.show_comparison(comparison)
         self._panels.centre.show_source(comparison, self._lanes())
         self._show_steps(comparison.first, f"Steps of {MARKS[0]} {names[0]}")

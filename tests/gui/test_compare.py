@@ -166,6 +166,8 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     assert progress.text.startswith(f"Steps of ● {comparison.members[0].name}")
     keys = [row.lane.key for row in window.centre.stack.visible_rows()]
     assert "residual" not in keys, "the model is not compared"
+    results = window.screen_.results
+    assert results.steps == [] and results.folder is None, "they are of one run"
     window.centre.compare_bar.align.group.button(1).click()
     starts = [m.source.holds[0].start + m.shift for m in comparison.members]
     assert abs(starts[0] - starts[1]) < 1e-9
@@ -202,3 +204,4 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     assert window.screen_.run.path == session.run.folder, "and then to its record"
     assert newer.name in progress.text, "not how the run ended that was opened"
     lab.until(lambda: "●" not in stack.row("V_C1").card.text)
+    assert results.folder == session.run.folder and results.steps

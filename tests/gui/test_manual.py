@@ -177,6 +177,8 @@ def test_manual_control_shows_live_and_stop_ends_it(lab) -> None:
 
 def test_the_lanes_show_the_coil_while_it_is_driven_by_hand(lab) -> None:
     session, window = lab.session, lab.window
+    results = window.screen_.results
+    results.folder = lab.folder / "an earlier run"
     session.begin_manual()
     lab.until(lambda: session.manual.opened)
     session.manual.hold(0.1)
@@ -191,6 +193,7 @@ def test_the_lanes_show_the_coil_while_it_is_driven_by_hand(lab) -> None:
     progress = window.centre.progress
     lab.until(lambda: "By hand" in progress.text)
     assert "kept" not in progress.text.partition("|")[2], "nothing is"
+    assert results.folder is None, "nor are there results of a run beside it"
     session.stop("enough")
     lab.until(lambda: not session.manual.alive)
     assert not source.running
