@@ -279,10 +279,12 @@ class Screen(QObject):
     def compare_live(self) -> None:
         """Compare the run in progress with the model, while probes are on the circuit.
 
-        Also between two steps, so that the session knows how well they agree.
+        Also between two steps, so that the session knows how well they agree. Before
+        the first the model has the force of a plan that has not begun.
         """
         session = self._panels.session
-        live = session.state is WindowState.RUNNING and session.run.probes == "circuit"
+        begun = session.state is WindowState.RUNNING and session.run.trial is not None
+        live = begun and session.run.probes == "circuit"
         if live and session.source is not None:
             self.results.compare_with_model(session.source)
 

@@ -47,7 +47,11 @@ def test_a_run_is_compared_between_two_steps_too(lab) -> None:
     """The run of an hour has one step, which does not end."""
     lab.run()
     lab.until(lambda: lab.session.run.agreement is not None)
-    assert lab.window.screen_.results.steps == []
+    results = lab.window.screen_.results
+    assert results.steps == []
+    lab.session.run.trial, asked = None, results._asked
+    lab.window.screen_.compare_live()
+    assert results._asked == asked, "where none has begun, it is beside no plan"
 
 
 def test_in_step_is_a_residual_within_its_band() -> None:
