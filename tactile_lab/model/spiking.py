@@ -150,7 +150,7 @@ def run_piece(
             need = V_f - V
             low, high = 0.0, left
             sure = False
-            d, e = max(a - ref, 0.0), 0.0
+            d, e, short = max(a - ref, 0.0), 0.0, 0.0
             if need > 0.0:
                 d = left
                 if d_3 > 0.0:
@@ -176,8 +176,11 @@ def run_piece(
                     drift = (Q - Q_ref) / d
                     rises = (Q - P_now) * per_tau
                     change = after = np.inf
+                    # no digits beyond those that the estimate tells
+                    enough = 1e-16 * d
                     if slope > 0.0:
                         per_slope = 1.0 / slope
+                        enough = max(enough, 1e-3 * S[ERROR] * per_slope)
                         z = -w * per_slope * per_tau
                         g = drift * per_slope
                         bends = abs(z * (g - rises * per_slope))
@@ -192,7 +195,7 @@ def run_piece(
                             change = -tau * math.log1p(-z)
                             after = tau * z * z * (bends + abs(g))
                     following = d + change
-                    settled = after <= 1e-16 * d and 0.0 < following < left
+                    settled = after <= enough and 0.0 < following < left
                     if not settled:
                         if w < 0.0:
                             if d >= left:
@@ -212,6 +215,7 @@ def run_piece(
                     step = following - d
                     d = following
                     if settled:
+                        short = min(after, enough)
                         # the series there, from those just evaluated
                         bends = 0.5 * step * per_tau * (drift - rises)
                         P_now += step * (rises + bends)
@@ -237,7 +241,7 @@ def run_piece(
             slope = (Q - V_f) * per_tau
             error = later(S[ERROR], e, Q_error, missed, swing, V_f, again)
             time_error = error / max(slope, 1e-300)
-            time_error += EPS * d
+            time_error += EPS * d + short
             if b - v < 2.0 * time_error and b < length:
                 S[DOUBT] = 1.0
             fire(at, time_error, S)

@@ -13,6 +13,7 @@ import numpy as np
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import TactileLabError
+from tactile_lab.model import kernel
 from tactile_lab.model.simulate import simulate
 from tactile_lab.validation import general, rivals, spice
 from tactile_lab.validation.exact_firing import exact_firing
@@ -94,9 +95,10 @@ def ours(problem: Problem, cap: float, tolerance: float = 1e-9) -> Answer:
         problem.circuit, problem.force, until=problem.until, start=problem.start,
         tolerance=tolerance,
     )  # fmt: skip
+    solved = found.solution
     return Answer(
-        found.solution.spike_times, found.end.V_C1, found.solution.evaluations,
-        found.error.spike_time,
+        solved.spike_times, float(solved.memory[kernel.Y]), solved.evaluations,
+        solved.error_spike_time,
     )  # fmt: skip
 
 

@@ -126,3 +126,11 @@ def test_a_train_takes_one_search_a_spike():
     found = simulate(Circuit(), force, until=2.5, tolerance=1e-6)
     assert found.spike_times.size == 111
     assert found.stages["spikes"] < 1.7 * 111
+
+
+def test_a_search_stops_where_the_estimate_ends():
+    """It took 1.9 a spike, for digits that the estimate says are wrong."""
+    force = Waveform.through([(0, 0), (5, 0), (5.01, 0.05), (105, 0.05)])
+    found = simulate(Circuit(V_GS=1.54141), force, tolerance=1e-6)
+    assert found.spike_times.size == 234
+    assert found.stages["spikes"] < 1.2 * 234
