@@ -87,7 +87,8 @@ class MeasuredTrial:
         start: on the run's time axis, s.
         duration: s.
         spike_times: shape (k,), s from the trial's start.
-        onset: when the stimulus begins, s from the trial's start.
+        onset: when the force begins to change, s from the trial's start; None where it
+            never does.
         hold: (start, end) of the constant part, s from the trial's start, or None.
         pause: a planned recovery; listed nowhere but in the time axis.
         rest: V_C1 just before the trial, V, or None.
@@ -106,7 +107,7 @@ class MeasuredTrial:
     start: float
     duration: float
     spike_times: FloatArray
-    onset: float = 0.0
+    onset: float | None = 0.0
     hold: tuple[float, float] | None = None
     pause: bool = False
     rest: float | None = None

@@ -178,8 +178,8 @@ class Waveform:
         there = self.time[inside][away[-1] + 1 :]
         return float(there[0]) if there.size else at
 
-    def departure(self, since: float, until: float) -> float:
-        """When it begins to leave the value it has at `since` s; or that, if never.
+    def departure(self, since: float, until: float) -> float | None:
+        """When it begins to leave the value it has at `since` s; None if never.
 
         It has not left while it changes by less than `NEAR` of its largest change.
 
@@ -190,7 +190,7 @@ class Waveform:
         inside = (self.time >= since) & (self.time <= until)
         apart = np.abs(self.value[inside] - float(self.at(since)))
         if not apart.size or apart.max() == 0:
-            return since
+            return None
         first = int(np.argmax(apart > NEAR * apart.max()))
         times = self.time[inside]
         return float(times[max(first - 1, 0)])

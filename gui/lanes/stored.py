@@ -17,10 +17,12 @@ from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.pyramid import FINE, Pyramid
 from tactile_lab.signals import AVERAGED
 from tactile_lab.store.layout import BIN
+from tactile_lab.store.onset import onsets
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.signal import StoredSignal
 from tactile_lab.store.spike_shapes import threshold_of
+from tactile_lab.store.stored_run import Records
 from tactile_lab.trace import Trace
 
 FINER = 2
@@ -65,6 +67,7 @@ class RunSource(Source):
         self.read_notes()
         self.trials = run.trials
         self.holds = [_hold(trial) for trial in self.trials]
+        self.onsets = _onsets(run, self.trials)
         self.simulated = run.simulated
         self.moves_probes, self.sets_voltages = _moves(run)
         self._threshold = threshold_of(run)
@@ -228,6 +231,14 @@ def _hold(trial: Any) -> Stretch:
     begin, stop = float(trial["hold_start"]), float(trial["hold_end"])
     held = None if begin != begin else (start + begin, start + stop)
     return Stretch(start, end, label, bool(trial["pause"]), held)
+
+
+def _onsets(run: Run, trials: Records) -> list[float | None]:
+    """When the force of each trial begins to change; None where it cannot be told."""
+    try:
+        return onsets(run, trials)
+    except SceneError:
+        return [None] * len(trials)
 
 
 def _moves(run: Run) -> tuple[bool, bool]:

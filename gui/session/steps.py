@@ -10,6 +10,7 @@ from gui.plots.numbers import number
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.quantity import show
 from tactile_lab.trial import Outcome
+from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
     from gui.lanes.stored import RunSource
@@ -39,14 +40,26 @@ def of_outcome(outcome: Outcome) -> MeasuredTrial | None:
         start=outcome.start,
         duration=trial.length,
         spike_times=outcome.spike_times,
+        onset=_begun(outcome),
         hold=trial.hold,
     )
+
+
+def _begun(outcome: Outcome) -> float | None:
+    """When its current began to change, s from its start; None where it never did."""
+    trial = outcome.trial
+    asked = (trial.current or trial.force).departure(0.0, trial.length)
+    if asked is None or not len(outcome.current):
+        return asked
+    flowing = Waveform.stairs(outcome.current, trial.length)
+    return flowing.departure(asked, trial.length)
 
 
 def of_run(source: RunSource) -> list[MeasuredTrial]:
     """What each step of a run on disk gave."""
     found = []
-    for row, hold in zip(source.trials, source.holds, strict=True):
+    rows = zip(source.trials, source.holds, source.onsets, strict=True)
+    for row, hold, onset in rows:
         if hold.pause:
             continue
         inside = (source.spikes >= hold.start) & (source.spikes < hold.end)
@@ -59,6 +72,7 @@ def of_run(source: RunSource) -> list[MeasuredTrial]:
                 start=hold.start,
                 duration=hold.end - hold.start,
                 spike_times=source.spikes[inside] - hold.start,
+                onset=onset,
                 hold=span if span[0] == span[0] else None,
                 complete=bool(row["complete"]),
             )

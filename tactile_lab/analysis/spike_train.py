@@ -79,21 +79,21 @@ class Response:
 def respond(
     spike_times: ArrayLike,
     *,
-    onset: float = 0.0,
+    onset: float | None = 0.0,
     hold: tuple[float, float] | None = None,
 ) -> Response:
     """Describe one trial's spikes.
 
     Args:
         spike_times: s from the trial's start.
-        onset: when the stimulus begins, s.
+        onset: when the stimulus begins, s; None where there is none, and no latency.
         hold: (start, end) of the constant part, s; None for the whole train.
 
     Raises:
         ParameterError: times not finite or not increasing.
     """
     times = _checked(spike_times)
-    after = times[times >= onset]
+    after = times[:0] if onset is None else times[times >= onset]
     held = within(times, hold)
     held_rates = 1.0 / np.diff(held)
     fall = None
@@ -101,7 +101,7 @@ def respond(
         fall = float(1.0 - held_rates[-1] / held_rates.max())
     return Response(
         spikes=int(times.size),
-        latency=float(after[0] - onset) if after.size else None,
+        latency=float(after[0] - onset) if onset is not None and after.size else None,
         ramp_spikes=int(times.size - held.size),
         peak_rate=float(held_rates.max()) if held_rates.size else None,
         final_rate=float(held_rates[-1]) if held_rates.size else None,

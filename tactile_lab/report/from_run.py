@@ -24,7 +24,7 @@ from tactile_lab.report.mains import told as mains_told
 from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
-from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.store.onset import onsets
 from tactile_lab.store.overrange import told as overrange_told
 from tactile_lab.store.overrange import unsearched
 from tactile_lab.store.progress import Progress, each, nothing
@@ -47,7 +47,6 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
     with Run.load(folder) as run:
         info, scene = run.info, run.scene
         current = run.applied.steps
-        onset = stimulus_onset(scene)
         started = _for_people(str(info.get("started", "")))
         settings: Mapping[str, Mapping[str, str]] = info.get("instruments") or {}
         changed = tuple(info.get("instruments_changed") or ())
@@ -63,7 +62,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             bench=scene.bench.name,
             duration=run.duration,
             took=info.get("took_s"),
-            trials=_trials(run, onset),
+            trials=_trials(run),
             force=run.force,
             current=current,
             warming=_warming(run),
@@ -167,16 +166,7 @@ def _said(path: Path) -> dict[str, str]:
     return {name: text for name, text in named.items() if text} | found
 
 
-def stimulus_onset(scene: Scene) -> float:
-    """When a presentation of the scene's protocol begins to change the force, s."""
-    if not isinstance(scene.protocol, ForceProtocol):
-        return 0.0
-    force = next(scene.protocol.presentations()).force
-    changed = np.flatnonzero(force.value != force.value[0])
-    return float(force.time[changed[0] - 1]) if changed.size else 0.0
-
-
-def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
+def _trials(run: Run) -> tuple[MeasuredTrial, ...]:
     """The trials, and what came after the last in a run that ended before its time."""
     spikes, scene = run.spikes["time"], run.scene
     blind, rows = unsearched(run), run.trials
@@ -186,11 +176,12 @@ def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
             complete,
             spikes,
             onset,
-            run.force,
             _clock(run, scene, float(row["start"]), float(row["end"])),
             blind,
         )
-        for row, complete in zip(rows, ended(rows).tolist(), strict=True)
+        for row, complete, onset in zip(
+            rows, ended(rows).tolist(), onsets(run, rows), strict=True
+        )
     ]
     end = max((t.start + t.duration for t in trials), default=0.0)
     late = spikes[(spikes >= end) & (spikes < run.stopped)] - end
@@ -202,6 +193,7 @@ def _trials(run: Run, onset: float) -> tuple[MeasuredTrial, ...]:
                 start=end,
                 duration=run.duration - end,
                 spike_times=late,
+                onset=None,
                 complete=False,
                 clock_uncertainty=_clock(run, scene, end, run.duration),
             )
@@ -227,8 +219,7 @@ def _trial(
     row: Any,
     complete: bool,
     spikes: FloatArray,
-    onset: float,
-    force: Waveform,
+    onset: float | None,
     clock: float | None,
     blind: FloatArray,
 ) -> MeasuredTrial:
@@ -240,8 +231,7 @@ def _trial(
         start=start,
         duration=end - start,
         spike_times=spikes[(spikes >= start) & (spikes < end)] - start,
-        # a coil that is set over a serial line begins late
-        onset=max(onset, force.departure(start + onset, end) - start),
+        onset=onset,
         hold=None if np.isnan(held[0]) else held,
         pause=bool(row["pause"]),
         complete=complete,

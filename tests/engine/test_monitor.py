@@ -60,6 +60,8 @@ def test_record_keeps_the_last_seconds_as_a_whole_run(tmp_path):
         assert run.info["notes"]["why"] == "trimmed"
     report = write(folder, read(folder))
     assert "fires at rest" in report.html.read_text()
+    trial = read(folder).results[0]
+    assert trial.response.spikes > 1 and trial.response.latency is None, "no onset"
 
 
 def test_watching_stops_when_asked_and_stores_nothing_of_itself(tmp_path, monkeypatch):

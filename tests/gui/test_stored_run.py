@@ -6,6 +6,9 @@ from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
 from PySide6.QtSvg import QSvgRenderer
 
+from gui.session.steps import of_run
+from tactile_lab.report.from_run import read
+
 
 def test_old_run_opens_in_the_same_lanes(lab) -> None:
     window, session = lab.window, lab.session
@@ -17,6 +20,9 @@ def test_old_run_opens_in_the_same_lanes(lab) -> None:
     lab.until(lambda: window.screen_.run not in (None, record))
     run = window.screen_.run
     assert np.allclose(run.spikes, live_spikes, atol=1e-3)
+    told = [trial.response.latency for trial in read(folder).results]
+    assert any(told)
+    assert [step.response.latency for step in of_run(run)] == told, "as in the report"
     lab.until(lambda: run.model is not None)
     window.centre.view.show_span(0.2, 0.001)
     lab.until(lambda: run.twin("V_C2", 0.2, 0.201, 1000).time.size > 500)

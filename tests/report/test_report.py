@@ -12,13 +12,15 @@ from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.report.findings import find
-from tactile_lab.report.from_run import sensor_texts, stimulus_onset
+from tactile_lab.report.from_run import sensor_texts
 from tactile_lab.report.html import rendered
 from tactile_lab.report.overview import overview
+from tactile_lab.report.page import page
 from tactile_lab.report.splice import stretches
 from tactile_lab.report.table import trials_table
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
+from tactile_lab.store.onset import stimulus_onset
 from tactile_lab.waveform import Waveform
 
 
@@ -364,3 +366,10 @@ def test_writing_tells_how_far_it_is(demo, tmp_path):
     told = []
     write(tmp_path, demo, progress=told.append)
     assert told == sorted(told) and told[-1] == 1.0 and len(told) > 1
+
+
+def test_spikes_that_nobody_looked_for_are_not_told_as_none(demo):
+    blind = find(replace(demo, searched=False))
+    told = page(blind, [])
+    assert "not looked for" in told and "Spikes found on line" not in told
+    assert "Spikes found on line" in page(find(demo), [])
