@@ -416,5 +416,7 @@ class CoilSource(SerialInstrument[CoilWire]):
             return
         self._interlock.tripped = complaint
         report = self.safe_off()
-        left = "" if report.verified else "At once it could not be verified off: "
-        raise InterlockError(f"{complaint} {left}{report.text.removeprefix(UNKNOWN)}")
+        if report.verified:  # how the coil was left is told by whoever ends the run
+            raise InterlockError(complaint)
+        left = f"At once it could not be verified off: {report.text}"
+        raise InterlockError(f"{complaint} {left.replace(UNKNOWN, '')}")
