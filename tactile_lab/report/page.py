@@ -71,7 +71,9 @@ def _key_numbers(run: RunData) -> dict[str, str]:
         "Status": run.status,
         "Duration": _seconds(run.duration),
         "Trials": f"{len(run.results)}{', the last cut short' if cut else ''}",
-        "Spikes": str(sum(t.response.spikes for t in run.results)),
+        "Spikes": str(sum(t.response.spikes for t in run.results))
+        if run.searched
+        else "not looked for",
     }
     if run.loss is not None:
         cells["Lost"] = run.loss.sentence.removeprefix("loss: ")
@@ -93,11 +95,12 @@ def _certificate(run: RunData) -> dict[str, str]:
             "Samples produced": _count(loss.samples_produced, "not known"),
             "Samples stored": _count(loss.samples_stored),
             "Samples lost": _count(loss.samples, "not known"),
-            "Spikes found on line": _count(loss.spikes_online),
-            "Differing when searched again": _count(
-                loss.spikes, "not possible: the searched channel was not stored"
-            ),
         }
+        if run.searched:
+            rows["Spikes found on line"] = _count(loss.spikes_online)
+            rows["Differing when searched again"] = _count(
+                loss.spikes, "not possible: the searched channel was not stored"
+            )
         if loss.covered is not None and loss.streamed is not None:
             rows["Time covered"] = (
                 f"{loss.covered:.4g} of {loss.streamed:.4g} s; gaps by design"

@@ -42,6 +42,7 @@ class Certificate:
         seen_from: shortest stretch of missing samples that the scope's driver would
             have noticed by its clock, s; None where it said nothing of that.
         missing: samples are missing, as the run found out, and how many is not known.
+        searched: whether spikes were looked for while the run went on.
     """
 
     produced: int | None
@@ -54,6 +55,7 @@ class Certificate:
     streamed: float | None = None
     seen_from: float | None = None
     missing: bool = False
+    searched: bool = True
 
     @property
     def samples(self) -> int | None:
@@ -89,7 +91,9 @@ class Certificate:
                 f"loss: {samples}; gaps by design, {self.covered:.4g} of "
                 f"{self.streamed:.4g} s covered"
             )
-        if self.differing is None:
+        if not self.searched:
+            spikes = "spikes were not looked for"
+        elif self.differing is None:
             spikes = (
                 f"{count(self.online, 'spike')}, not possible to check (not stored)"
             )
@@ -144,6 +148,7 @@ def certify(run: Run) -> Certificate:
         offline=None if offline is None else offline.size,
         differing=None if offline is None else unmatched(online, offline).size,
         missing=bool(run.info.get("samples_missing")),
+        searched=run.detection is not None,
     )
 
 

@@ -272,17 +272,27 @@ def test_a_spike_that_is_not_in_the_samples_is_named(complete):
     assert "sample 1234.500" in str(verdict.findings[0])
 
 
-def test_spikes_cannot_be_checked_where_v_k_is_not_stored(bench, folder, tmp_path):
+@pytest.mark.parametrize(
+    ("searched", "told"),
+    [(True, "spikes, not possible to check"), (False, "spikes were not looked for")],
+)
+def test_spikes_cannot_be_checked_where_v_k_is_not_stored(
+    bench, folder, searched, told
+):
     from tactile_lab.store.layout import Layout
     from tactile_lab.store.recorder import Recorder
 
-    layout = Layout(signals=("V_C1",), detection=bench.DETECTION, simulated=True)
+    layout = Layout(
+        signals=("V_C1",),
+        detection=bench.DETECTION if searched else None,
+        simulated=True,
+    )
     recorder = Recorder(folder, layout, reserve=0)
     bench.play(recorder, bench.codes(3000), 500)
     recorder.close("complete", 3000)
     certificate = write_certificate(folder.path)
     assert certificate.spikes is None
-    assert "not possible to check" in str(certificate)
+    assert told in str(certificate)
 
 
 def test_samples_the_scope_made_but_nobody_stored_are_counted(bench, recorder, folder):
