@@ -104,6 +104,12 @@ class Magnet(SceneTable):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ParameterError(f"{name} = {value} must be finite and above 0.")
+        if not 0 < self.newtons_per_tesla < math.inf:
+            raise ParameterError(
+                f"r = {self.r:g} m with A1, A2 and B1 gives {self.newtons_per_tesla:g} "
+                "N/T by Eq. (2), which is no force to compute with. Look at the units; "
+                "r is some millimetres."
+            )
         if not math.isfinite(self.B2_per_ampere) or self.B2_per_ampere == 0:
             raise ParameterError(
                 f"B2_per_ampere = {self.B2_per_ampere} T/A must be finite and not 0."
@@ -119,7 +125,7 @@ class Magnet(SceneTable):
     @property
     def newtons_per_tesla(self) -> float:
         """Force per field of the electromagnet, Eq. (2), N/T."""
-        return self.B1 * self.A1 * self.A2 / (4 * math.pi * MU_0 * self.r**2)
+        return self.B1 * self.A1 * self.A2 / (4 * math.pi * MU_0) / self.r / self.r
 
     @property
     def newtons_per_ampere(self) -> float:

@@ -20,6 +20,7 @@ from tactile_lab.plugins import (
     scene_names,
     scene_path,
 )
+from tactile_lab.quantity import show
 from tactile_lab.scene import overrides as options
 from tactile_lab.scene.bench_file import BenchSpec, is_file
 from tactile_lab.scene.overrides import Overrides
@@ -307,7 +308,8 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
             raise SceneError(f'{path}: a bench file has no key "file".')
         _refuse_impossible(under, _blame(str(path), {}))
         whole = under = _living(tuples(under))
-        validated(BenchSpec, whole, (), _blame(str(path), {}), None)
+        alone = validated(BenchSpec, whole, (), _blame(str(path), {}), None)
+        _refuse_endless_heat(whole, alone, (), _blame(str(path), {}))
         if inline.get("simulated") is False and under.get("simulated") is True:
             raise complaint(
                 ("bench", "simulated"), f"{file} is a simulated bench.", blame
@@ -315,7 +317,30 @@ def _bench(table: dict[str, Any], folder: Path, blame: Blame) -> BenchSpec:
     merged = _merged(_of_the_same_rows(under, inline), _placed(inline, folder))
     if path is not None:
         folder, merged["file"] = path.parent, str(path)
-    return validated(BenchSpec, merged, ("bench",), blame, folder)
+    spec = validated(BenchSpec, merged, ("bench",), blame, folder)
+    _refuse_endless_heat(inline, spec, ("bench",), blame)
+    return spec
+
+
+def _refuse_endless_heat(
+    given: Mapping[str, Any], spec: BenchSpec, at: tuple[str, ...], blame: Blame
+) -> None:
+    """Refuse a continuous current, if it was given, that no current could exceed.
+
+    A source may well be narrower than the coil, so one that was not given stands.
+    """
+    table = given.get("coil", {}).get("limits", {})
+    if spec.coil is None or "continuous" not in table:
+        return
+    limits = spec.coil.limits
+    if limits.continuous > limits.current:
+        raise complaint(
+            (*at, "coil", "limits", "continuous"),
+            f"{show(limits.continuous, 'A')} is more than current, "
+            f"{show(limits.current, 'A')}, so that heat would never count; give what "
+            "may flow for ever.",
+            blame,
+        )
 
 
 def _of_the_same_rows(under: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:

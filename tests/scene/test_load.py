@@ -338,6 +338,19 @@ def test_a_refractory_time_that_no_spike_outlives_is_refused():
         load("demo", {"detect.refractory": "1e18 s"})
 
 
+def test_a_continuous_current_that_no_current_exceeds_is_refused():
+    with pytest.raises(SceneError, match=r"continuous: 5 A is more than current, 2 A"):
+        load("demo", {"bench.coil.limits.continuous": "5 A"})
+    narrow = load("demo", {"bench.coil.limits.current": "0.5 A"}).bench.coil.limits
+    assert narrow.continuous == 0.6, "a source may be narrower than the coil"
+
+
+@pytest.mark.parametrize("r", ["1e-200 mm", "1e200 m"])
+def test_a_distance_that_gives_no_force_is_blamed_on_itself(r):
+    with pytest.raises(SceneError, match=r"r = 1e[-+]20\d m with A1, A2 and B1 gives"):
+        load("demo", {"bench.magnet.r": r})
+
+
 @pytest.mark.parametrize("key", ["coil_lag", "eddy_lag", "lag_uncertainty"])
 def test_a_lag_of_the_field_that_no_core_has_is_refused(key):
     with pytest.raises(SceneError, match="at most 10 s"):
