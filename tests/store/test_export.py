@@ -101,6 +101,8 @@ def test_matlab_reads_names_units_and_values(run, tmp_path):
     np.testing.assert_allclose(content["time"][3000], 53.0)
     np.testing.assert_allclose(content["spikes"]["time"], run.spikes["time"])
     np.testing.assert_allclose(content["current"]["setpoint"], [0.25, 0.5])
+    assert content["current"]["units"]["setpoint"] == "A"
+    assert content["trials"]["units"]["level"] == "N"
 
 
 def test_impossible_parts_are_refused(run, tmp_path):

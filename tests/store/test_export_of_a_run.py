@@ -145,6 +145,10 @@ def test_parquet_is_read_with_its_units(run, columns, tmp_path):
     np.testing.assert_allclose(read["V_C1"], columns[1]["V_C1"], rtol=1e-6)
     assert read.schema.field("I_DS").metadata == {b"unit": b"A"}
     assert read.schema.metadata[b"note lab"] == b"Touch"
+    attrs = (
+        pytest.importorskip("pandas").read_parquet(tmp_path / "trials.parquet").attrs
+    )
+    assert (attrs["units"]["level"], attrs["about"]["note lab"]) == ("N", "Touch")
     trials = parquet.read_table(tmp_path / "trials.parquet").to_pylist()
     assert trials[0]["hold_end"] - trials[0]["hold_start"] == pytest.approx(0.8)
 

@@ -36,6 +36,8 @@ def export(
 ) -> list[Path]:
     """Write `file`: time (s), and structs of values (single, SI) and unit.
 
+    Tables are structs of their columns, with a struct `units` of the same names.
+
     Signals are not compressed: that would take a minute.
 
     Raises:
@@ -89,7 +91,8 @@ def export(
 
 
 def _struct(table: ExportTable) -> dict[str, Any]:
-    return {
+    columns: dict[str, Any] = {
         name: values.astype(object) if values.dtype.kind == "U" else values
         for name, values in table.columns.items()
     }
+    return columns | {"units": table.units}

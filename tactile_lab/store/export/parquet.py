@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,8 @@ def export(
     """Write `signals.parquet`, `spikes.parquet`, `trials.parquet`, ... into `folder`.
 
     Signals are single precision, times double. Every column names its unit in the
-    field's metadata; the schema of each file says what the run is. Files of these
+    field's metadata; the schema of each file says what the run is; pandas finds both
+    in `attrs`. Files of these
     names that an earlier export left there are replaced or removed.
 
     Raises:
@@ -52,7 +54,9 @@ def export(
             pa.field(n, kind, metadata={"unit": units[n]})
             for n, kind in columns.items()
         ]
-        return pa.schema(fields, metadata=told)
+        # what pandas reads into `attrs`; it passes over the metadata of fields
+        attrs = json.dumps({"units": units, "about": told})
+        return pa.schema(fields, metadata=told | {"PANDAS_ATTRS": attrs})
 
     made = []
     if rows:
