@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QPoint, Qt, QTimer, Signal
-from PySide6.QtGui import QShowEvent
+from PySide6.QtGui import QKeySequence, QShortcut, QShowEvent
 from PySide6.QtWidgets import QMenu, QWidget
 
 from gui.look.theme import Theme
@@ -100,6 +100,9 @@ class RunsView(QWidget):
         parts = (head, self.filter, top, page, first, self.rerun, self.compare)
         stack(self, parts, page)
         self.search.textChanged.connect(self._show_first)
+        down = QShortcut(QKeySequence("Down"), self.search)
+        down.setContext(Qt.ShortcutContext.WidgetShortcut)
+        down.activated.connect(self._go_to_list)
         self.filter.group.idClicked.connect(self._show_first)
         self.order.currentIndexChanged.connect(self._show_first)
         self.refresh.clicked.connect(self.refresh_asked)
@@ -210,6 +213,12 @@ class RunsView(QWidget):
             there = [card for card in self.cards if card.entry.folder == focused]
             to = next(iter(there or self.cards), None) or self.search
             QTimer.singleShot(0, to, to.setFocus)  # once it is on screen
+
+    def _go_to_list(self) -> None:
+        """Give the keyboard to the chosen run, or to the first."""
+        chosen = [card for card in self.cards if card.entry == self._chosen]
+        for card in (chosen or self.cards)[:1]:
+            reach(card)
 
     def _step(self, card: RunCard, way: int) -> None:
         """Give the keyboard to the run below (1) or above (-1)."""

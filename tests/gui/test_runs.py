@@ -173,6 +173,9 @@ def test_arrows_go_from_run_to_run_and_tab_comes_to_one(runs: RunsView, qtbot) -
     qtbot.waitUntil(runs.cards[0].hasFocus)
     QTest.keyClick(runs.cards[0], Qt.Key.Key_Up)
     assert runs.cards[0].hasFocus()
+    runs.search.setFocus()
+    QTest.keyClick(runs.search, Qt.Key.Key_Down)
+    qtbot.waitUntil(runs.cards[0].hasFocus)
 
 
 def test_runs_of_a_protocol_say_in_what_they_differ(runs: RunsView) -> None:
