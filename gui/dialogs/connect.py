@@ -34,7 +34,7 @@ from gui.parts import (
 from gui.review.conclusion import conclusion_of
 from gui.session.log import Severity
 from gui.session.session import Session
-from gui.state import WindowState, minutes
+from gui.state import WindowState
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.errors import TactileLabError
 from tactile_lab.plugins import protocol_checking
@@ -216,12 +216,8 @@ class Connect(Overlay):
                     session.status.fault.title if session.status.fault else "Fault"
                 )
             elif session.state is WindowState.RUNNING and session.run.trial is not None:
-                index, words = session.run.trial
-                left = ""
-                if session.run.expected is not None:
-                    rest = minutes(max(0.0, session.run.expected - session.run.elapsed))
-                    left = f", {rest} left"
-                self._say_progress(f"Step {index + 1}: {words}{left}", busy=True)
+                index, words = session.run.trial  # the header's clock has the time
+                self._say_progress(f"Step {index + 1}: {words}", busy=True)
             return
         reason = {
             WindowState.READY: "",

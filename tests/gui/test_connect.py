@@ -156,9 +156,11 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
     assert not dialog.wiring.check.isEnabled()
     lab.until(lambda: asked)
     assert asked[0].path == "wiring_check" and asked[0].bench == "sim"
-    session.run.trial = (0, "rest")
+    session.run.trial, session.run.expected = (0, "rest"), 60.0
     session.status.enter(WindowState.RUNNING)
-    assert dialog.wiring.progress.text().startswith("Step 1: rest")
+    assert dialog.wiring.progress.text() == "Step 1: rest", (
+        "time left would stand still"
+    )
     session.status.fault = FaultNotice("The coil source is gone.", "Coil off.")
     session.status.enter(WindowState.FAULT)
     assert dialog.wiring.progress.text() == "The coil source is gone."
