@@ -223,6 +223,7 @@ class Connect(Overlay):
             WindowState.READY: "",
             WindowState.DISCONNECTED: "Connect a bench first.",
             WindowState.CONNECTING: "The bench is still connecting.",
+            WindowState.FAULT: "Acknowledge the fault first.",
         }.get(session.state, "Another run is in progress.")
         if session.manual.alive:
             reason = "The coil is driven by hand; switch it off first."

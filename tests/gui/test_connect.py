@@ -164,6 +164,8 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
     session.status.fault = FaultNotice("The coil source is gone.", "Coil off.")
     session.status.enter(WindowState.FAULT)
     assert dialog.wiring.progress.text() == "The coil source is gone."
+    session.status.changed.emit()
+    assert dialog.wiring.progress.text() == "Acknowledge the fault first."
     session.acknowledge()
     lab.until(dialog.wiring.check.isEnabled)
     said = {"V_C1": {"ok": True, "text": "4.35 V at rest"},
