@@ -57,7 +57,7 @@ class ConnectedBench(QObject):
         answers: of each instrument that was asked last.
         overrides: ``bench.key=value`` texts that change the file.
         request: a run that needs every instrument.
-        field: as read last, T.
+        field: as read on request since the instruments were last asked or used, T.
         reading: the field is being read.
 
     Args:
@@ -105,7 +105,7 @@ class ConnectedBench(QObject):
     def check(self) -> None:
         """Ask the instruments who they are, and have the coil verified off."""
         if self.request is not None:
-            self._looking = False
+            self._looking, self.field = False, None
             self._status.enter(WindowState.CONNECTING)
             self._link.ask(self._checked, check_bench, self.request)
 
@@ -169,10 +169,6 @@ class ConnectedBench(QObject):
             self._link.ask(self._field_read, read_field, self.request, task)
             self._status.changed.emit()
 
-    def note_field(self, field: float) -> None:
-        """The field was read, T."""
-        self.field = field
-
     def _field_read(self, reply: Reply[FieldReading]) -> None:
         self.reading, found = False, reply.value
         if found is None:
@@ -186,7 +182,7 @@ class ConnectedBench(QObject):
 
     def confirm(self) -> None:
         """A run has used the instruments to its end: they are there."""
-        self._answered = time.monotonic()
+        self._answered, self.field = time.monotonic(), None
 
     def watch(self) -> None:
         """Look at who is still there where the last answer has become old."""

@@ -122,13 +122,13 @@ class Chips:
 
     def _meter(self) -> InstrumentView:
         lamp, words = self._found("meter")
-        spec, field = self._bench.spec, self._bench.field
+        spec, field = self._bench.spec, self._run.field
         meter = None if spec is None else spec.field_meter
         if meter is not None and meter.driver == "manual":
             words = "a person reads it"
-        value = "—" if field is None else show(round(field, 5), "T", 3)
+        value = "—"
         if self._status.state is WindowState.RUNNING and field is not None:
-            lamp = Lamp.ACTIVE
+            lamp, value = Lamp.ACTIVE, show(round(field, 5), "T", 3)
         return InstrumentView(ROLES["meter"], lamp, _maker_and_model(words), value)
 
     def _thermometer(self) -> InstrumentView:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,7 +41,6 @@ class LiveRun(LiveTask):
 
     Args:
         out: folder for run folders.
-        field_read: told the field, T, as it is read.
 
     Attributes:
         source: what is seen of it; None before its first word.
@@ -52,6 +50,7 @@ class LiveRun(LiveTask):
         trial: number and label of the step in progress.
         voltages: what source meters were read back to hold, V.
         kelvin: temperature of the sensor as read last, K; None before.
+        field: as read last, T; None before.
         probes: what the probes touch in this trial: the circuit, or something else.
         asked: what it waits for a person to do; None while nobody is asked.
         elapsed, expected: run time, s.
@@ -69,16 +68,9 @@ class LiveRun(LiveTask):
     completed = Signal()
     reported = Signal(object)
 
-    def __init__(
-        self,
-        link: Link,
-        status: Status,
-        log: Log,
-        out: Path,
-        field_read: Callable[[float], None],
-    ) -> None:
+    def __init__(self, link: Link, status: Status, log: Log, out: Path) -> None:
         super().__init__(link, status, log)
-        self.out, self._field_read = out, field_read
+        self.out = out
         self.source: LiveSource | None = None
         self.request: Request | None = None
         self.title = self.name = ""
@@ -89,6 +81,7 @@ class LiveRun(LiveTask):
         self.asked: PersonAsked | None = None
         self.voltages: dict[str, float] = {}
         self.kelvin: float | None = None
+        self.field: float | None = None
         self.elapsed = 0.0
         self.expected: float | None = None
         self.agreement: Agreement | None = None
@@ -109,7 +102,7 @@ class LiveRun(LiveTask):
         """
         self.source, self.trial, self.agreement = None, None, None
         self.elapsed, self.expected, self.asked = 0.0, None, None
-        self.voltages, self.kelvin = {}, None
+        self.voltages, self.kelvin, self.field = {}, None, None
         self.request, self.expectation = request, expectation
         self.title = self.name = title
         notes = dict(self.notes)
@@ -176,7 +169,7 @@ class LiveRun(LiveTask):
                 coil.sign_of_life()
                 source.add_current(at, sent if read is None else read)
             case events.FieldRead(time=at, field=field):
-                self._field_read(field)
+                self.field = field
                 source.add_field(at, field)
             case events.TemperatureRead(time=at, kelvin=kelvin):
                 self.kelvin = kelvin

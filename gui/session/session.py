@@ -76,7 +76,7 @@ class Session(QObject):
             *parts, lambda: self._free and not self.monitor.alive
         )
         self.plan = FormPlan(lambda: self._planner)
-        self.run = LiveRun(*parts, out, self.bench.note_field)
+        self.run = LiveRun(*parts, out)
         self.monitor = LiveMonitor(*parts)
         self.manual = LiveManual(*parts)
         self.queue = Queue(

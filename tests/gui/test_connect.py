@@ -339,6 +339,8 @@ def test_a_person_reads_the_field_for_a_calibration(calibrating) -> None:
     with Run.load(session.run.folder) as run:
         assert run.field["field"] == pytest.approx([10.8e-3 * i for i in asked])
     assert card.isHidden() and session.coil_view().verified_off
+    assert session.run.field == pytest.approx(10.8e-3 * asked[-1])
+    assert session._chips._meter().value == "—", "it was read in the run"
 
 
 def test_what_is_no_field_is_not_sent_and_what_is_doubted_asked_again(

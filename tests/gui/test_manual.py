@@ -66,6 +66,8 @@ def test_field_is_read_on_request(lab) -> None:
     lab.until(lambda: not session.bench.reading)
     assert session.bench.field is not None
     assert window.review.manual.read.isEnabled()
+    session.bench.check()
+    assert session.bench.field is None, "that was before"
 
 
 def test_a_current_that_is_set_while_the_source_opens_is_not_lost(lab) -> None:
