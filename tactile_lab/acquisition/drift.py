@@ -13,7 +13,8 @@ import numpy as np
 
 from tactile_lab.errors import LimitError
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.equations import V_P, rest_V_C1
+from tactile_lab.model.equations import rest_V_C1
+from tactile_lab.model.film import Film
 from tactile_lab.quantity import show
 from tactile_lab.waveform import Waveform
 
@@ -38,7 +39,7 @@ class Drift:
         self._circuit = circuit
         self._force_for = force_for
         self._limit = limit
-        self._V_P, self._at, self._force = 0.0, 0.0, 0.0
+        self._film = Film(circuit)
         self._still = -STILL
         self._first: tuple[float, float] | None = None
 
@@ -55,10 +56,9 @@ class Drift:
             LimitError: it is beyond the limit, and so is the change of V_C1 itself: a
                 film that remembers less than believed is no drift.
         """
-        if abs(self._force) > NOTHING or time < self._still + STILL:
+        if abs(self._film.force) > NOTHING or time < self._still + STILL:
             return None
-        remembered = V_P(self._circuit, self._V_P, 0.0, max(time - self._at, 0.0))
-        alone = V_C1 - rest_V_C1(self._circuit, remembered)
+        alone = V_C1 - rest_V_C1(self._circuit, self._film.V_P(time))
         if self._first is None:
             if cut_off:
                 return None
@@ -75,16 +75,7 @@ class Drift:
     def plays(self, current: Waveform, begin: float) -> None:
         """The coil plays `current`, A against s from run time `begin` s."""
         force = self._force_for(current)
-        volts = V_P(self._circuit, self._V_P, 0.0, max(begin - self._at, 0.0))
-        volts += self._circuit.k_F * (float(force.value[0]) - self._force)
-        for start, end, low, high in force.segments():
-            if end > start:
-                slope = (high - low) / (end - start)
-                volts = V_P(self._circuit, volts, slope, end - start)
-            else:
-                volts += self._circuit.k_F * (high - low)
-        moved = np.flatnonzero(np.diff(force.value, prepend=self._force))
+        moved = np.flatnonzero(np.diff(force.value, prepend=self._film.force))
         if moved.size:
             self._still = begin + float(force.time[moved[-1]])
-        self._V_P, self._at = volts, begin + force.end
-        self._force = float(force.value[-1])
+        self._film.feels(force, begin)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from tactile_lab.analysis.carried_over import Begun, carried_over
 from tactile_lab.planning.calibrated import check_calibration
 from tactile_lab.planning.computing import Computing, Saving, computing, savings
 from tactile_lab.planning.estimate import Cost, estimate
@@ -80,6 +81,17 @@ class Plan:
             0 if spikes is None else int(spikes.size),
             self.estimate.update_interval,
         )
+
+    @cached_property
+    def carried_over(self) -> str | None:
+        """What is said of trials that do not begin from rest; None where all do."""
+        drive = self.timeline
+        levels = [
+            Begun(step.trial.label, step.start, step.trial.level)
+            for step in drive.steps
+            if step.trial.level
+        ]
+        return carried_over(self.scene.circuit, drive.force, levels)
 
     @property
     def savings(self) -> tuple[Saving, ...]:
@@ -157,6 +169,7 @@ class Plan:
             "ways": [used.to_dict() for used in self.ways],
             "ways_instead": [one.to_dict() for one in self.ways_instead],
             "resolution": dict(cost.resolution),
+            "carried_over": self.carried_over,
             "preview": self._preview(),
             "assumptions": list(self.assumptions),
             "warnings": list(self.warnings),
@@ -313,6 +326,8 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
         yield f"{BY_WAY[one.way]} instead", str(one)
     if plan.preview is not None and plan.preview.spike_times is not None:
         yield "spikes", f"{plan.preview.spike_times.size} by the model"
+    if carried := plan.carried_over:
+        yield "carried over", carried
     if plan.preview is not None:
         error, spikes = plan.preview.error, plan.preview.spike_times
         known = [

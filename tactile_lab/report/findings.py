@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tactile_lab.analysis.carried_over import Begun, carried_over
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import TactileLabError
 from tactile_lab.measurement import CUT_OFF, RecordedSignal
@@ -118,7 +119,16 @@ def _conclusion(run: RunData) -> Conclusion:
             own.plain  # noqa: B018 - what cannot be stored is no conclusion
         except (Exception, SystemExit) as error:  # of the user's own
             own = Conclusion(missing=(f"No conclusion: {run.protocol.fault(error)}",))
-    return own + force_at_zero(run)
+    return own + force_at_zero(run) + _carried_over(run)
+
+
+def _carried_over(run: RunData) -> Conclusion:
+    """Which trials did not begin from rest, by the force that was applied."""
+    if run.circuit is None:
+        return Conclusion()
+    levels = [Begun(t.label, t.start, t.level) for t in run.results if t.level]
+    said = carried_over(run.circuit, run.force, levels)
+    return Conclusion() if said is None else Conclusion((said,))
 
 
 def _cut_short(run: RunData) -> tuple[str, ...]:
