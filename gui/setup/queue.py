@@ -52,7 +52,7 @@ class QueueCard(QFrame):
         self.setAccessibleName(f"{number + 1}: {item.title}, {cost}{state}")
         self.setAccessibleDescription("Enter edits it, Delete takes it out")
         self.setToolTip(f"{item.title}: {cost}\nClick or Enter edits it")
-        self.parts: dict[str, QWidget] = {"card": self}
+        self.buttons: dict[str, QWidget] = {}
         whole = column(self, spacing=0)
         whole.setContentsMargins(10, 2, 2, 5)
         top = row((Elided(item.title), 1), spacing=0)
@@ -68,7 +68,7 @@ class QueueCard(QFrame):
             if wanted:
                 button = IconButton(theme, icon, words)
                 button.clicked.connect(told)
-                self.parts[icon] = button
+                self.buttons[icon] = button
                 top.addWidget(button)
             elif icon != "edit":  # the others stay below each other
                 top.addSpacing(BUTTON)
@@ -178,7 +178,7 @@ class QueueView(QWidget):
         """Which part of which row has the keyboard."""
         has = QApplication.focusWidget()
         for number, card in enumerate(self.cards):
-            for name, part in card.parts.items():
+            for name, part in (("card", card), *card.buttons.items()):
                 if part is has:
                     return number, card.item, name
         return None
@@ -187,4 +187,4 @@ class QueueView(QWidget):
         """The keyboard follows its run; where that has gone, the next takes it."""
         there = [card for card in self.cards if card.item is item]
         card = there[0] if there else self.cards[min(number, len(self.cards) - 1)]
-        card.parts.get(name, card).setFocus()
+        card.buttons.get(name, card).setFocus()

@@ -12,6 +12,13 @@ from PySide6.QtCore import QEvent, QObject
 from PySide6.QtWidgets import QApplication
 from whatever_is_open import openers, shut
 
+from gui.look.theme import Theme
+from gui.session.queue import Queued
+from gui.setup.queue import QueueView
+from tactile_lab.engine.request import Request
+
+REQUEST = Request("demo", (), "sim")
+
 
 def settle(app: QApplication) -> None:
     """Let what was put off be done, the end of closed widgets above all."""
@@ -82,6 +89,19 @@ def test_a_run_that_is_shut_leaves_nothing_to_the_collector(lab) -> None:
 
     show()
     assert not in_circles(show_twice)
+
+
+def test_a_run_that_waited_leaves_nothing_to_the_collector(app) -> None:
+    """Its plan stayed with it, half a MB each, until the collector came by."""
+    view = QueueView(Theme("light"))
+
+    def wait() -> None:
+        view.show_queue([Queued("one", REQUEST), Queued("two", REQUEST)], held=False)
+        view.show_queue([], held=False)
+        settle(app)
+
+    wait()
+    assert not in_circles(wait)
 
 
 def test_another_protocol_in_the_form_leaves_nothing_to_the_collector(lab) -> None:

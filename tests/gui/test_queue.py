@@ -210,11 +210,11 @@ def test_moved_run_keeps_the_keyboard(lab) -> None:
     window, session = lab.window, lab.session
     three_waiting(lab)
     window.activateWindow()
-    window.setup.queue.cards[0].parts["down"].setFocus()
-    lab.until(lambda: window.setup.queue.cards[0].parts["down"].hasFocus())
+    window.setup.queue.cards[0].buttons["down"].setFocus()
+    lab.until(lambda: window.setup.queue.cards[0].buttons["down"].hasFocus())
     QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Space)
     assert [item.title for item in session.queue.items] == ["two", "one", "three"]
-    assert lab.app.focusWidget() is window.setup.queue.cards[1].parts["down"]
+    assert lab.app.focusWidget() is window.setup.queue.cards[1].buttons["down"]
     window.setup.queue.cards[1].setFocus()
     QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Delete)
     assert [item.title for item in session.queue.items] == ["two", "three"]
