@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import pickle
 import re
 import weakref
 from collections.abc import Callable, Iterator, Sequence
@@ -137,6 +138,7 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         super().__init__()
         self._theme, self.nothing, self._fixed = theme, nothing, height
         self.plot: Plot | None = None
+        self._told = b""
         self.panels: list[PanelItem] = []
         self.tell: Callable[[int], str] = lambda number: ""
         self.setFixedHeight(height) if height else self.setMinimumHeight(PANEL)
@@ -149,7 +151,14 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self.draw()
 
     def show_plot(self, plot: Plot | None) -> None:
-        """Show a plot, or nothing; where the user zoomed in the same plot stays."""
+        """Show a plot, or nothing; where the user zoomed in the same plot stays.
+
+        One that is as before stays as it is: it costs more than a frame to build.
+        """
+        told = pickle.dumps((plot, self.nothing))
+        if told == self._told:
+            return
+        self._told = told
         same = (
             plot is not None and self.plot is not None and self.plot.name == plot.name
         )

@@ -99,6 +99,21 @@ def test_a_zoom_stays_when_the_next_step_comes_and_a_double_click_ends_it(app):
     assert left <= 0 and right >= 100 and low <= 0 and high >= 30
 
 
+def test_a_plot_that_is_as_before_is_not_built_again(app):
+    """Every two seconds of a run the rates were built anew, which were as before."""
+    view = shown(app)
+    (panel,) = view.panels
+    view.show_plot(rates(10.0))
+    assert view.panels == [panel]
+    view.show_plot(rates(30.0))
+    assert view.panels != [panel]
+    view.show_plot(None)
+    before = view.grab().toImage()
+    view.nothing = "No step has fired."
+    view.show_plot(None)
+    assert view.grab().toImage() != before
+
+
 @pytest.mark.parametrize("key", ["NoModifier", "ControlModifier"])
 def test_the_wheel_scrolls_the_page_and_zooms_with_ctrl(app, key):
     view = shown(app)
