@@ -147,10 +147,14 @@ def begin(window: Window, target: str | None, bench: str | None) -> None:
 
 
 def _load_reader() -> None:
-    """Load what reads runs: at the end of a run it would hold up the lanes."""
+    """Load what reads runs, and what numpy loads when asked for unique values.
+
+    At the end of a step or of a run it would hold up the lanes.
+    """
 
     def load() -> None:
-        importlib.import_module("gui.lanes.stored")
+        for name in ("numpy.ma", "gui.lanes.stored"):
+            importlib.import_module(name)
 
     start(load, "load reader")
 
