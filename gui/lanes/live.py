@@ -49,7 +49,6 @@ class LiveSource(Source):
         self._twin_spikes = NONE
         self._gain = newtons_per_ampere
         self._loop: list[tuple[float, float, float]] = []
-        self._new = False
         self._pyramids: dict[str, Pyramid] = {}
         self._slow = {name: Readings() for name in ("force", *AVERAGED)}
         self._spikes = np.empty(1024)
@@ -110,12 +109,6 @@ class LiveSource(Source):
         """The newest samples by signal."""
         for signal, part in bins.items():
             self._pyramids.setdefault(signal, Pyramid()).add(part)
-            self._new = self._new or not part.empty
-
-    def take_new(self) -> bool:
-        """Whether samples have come since this was last asked."""
-        new, self._new = self._new, False
-        return new
 
     def add_spikes(self, times: tuple[float, ...]) -> None:
         """Detected spikes, ascending."""

@@ -59,14 +59,13 @@ class FrameLoop(QObject):
         """One frame."""
         begun = time.perf_counter()
         panels, session = self._panels, self._panels.session
-        moved = session.poll()
+        told = session.poll()
         for stop in panels.stops:
             stop.show_coil(session.state, session.coil_view())
         now = time.monotonic()
         source, seen = self._screen.live, not panels.centre.lanes.window().isMinimized()
-        if source is not None and seen and not self.frozen:
-            if source.running or moved:
-                self._show_newest(source)
+        if source is not None and told and seen and not self.frozen:
+            self._show_newest(source)
         self._screen.take_fetched()
         if now - self._numbers >= NUMBERS:
             self._numbers = now

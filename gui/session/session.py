@@ -276,11 +276,11 @@ class Session(QObject):
         )
 
     def poll(self) -> bool:
-        """Take all that the engine told; whether samples came too."""
-        self.link.poll()
+        """Take all that the engine told; whether it told anything."""
+        told = self.link.poll()
         self.desk.poll()
         self.bench.watch()
-        return self.source is not None and self.source.take_new()
+        return told
 
     def close(self) -> None:
         """Let go of the engine; nothing drives a coil any more."""

@@ -168,16 +168,19 @@ class Link:
             self._asked[number] = then
             self._write((number, Engine.ask, act, arguments, named))
 
-    def poll(self) -> None:
-        """Hand over all that came since; in the calling thread."""
+    def poll(self) -> bool:
+        """Hand over all that came since, in the calling thread; whether any did."""
+        came = False
         while True:
             try:
                 take, told = self._inbox.get_nowait()
             except Empty:
                 break
+            came = True
             take(told)
         if self._rest is not None and time.monotonic() - self._used > self._rest:
             self._let_rest()
+        return came
 
     @property
     def idle(self) -> bool:

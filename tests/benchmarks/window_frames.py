@@ -5,7 +5,9 @@
 Idle, a run in real time on the simulated bench, an emulated input of 4 x 7.8125 MS/s,
 and an hour-long record at 1 MS/s scrolled and zoomed. A frame is the poll plus the
 painting it causes, in the window's own thread; "processor" is its own time, which
-other programs on the machine do not change. Gaps are those of a 10 ms heartbeat; "of
+other programs on the machine do not change. All lanes are painted in every frame but
+those of the run in real time: there the window paints where something was told, and
+frames that painted nothing are left out. Gaps are those of a 10 ms heartbeat; "of
 its own" leaves out the time in which Linux gave the processor to somebody else.
 
 `window_figures.py` puts this and its neighbours into one page.
@@ -70,6 +72,9 @@ class Bench:
         self.gaps: list[float] = []
         self.own: list[float] = []
         self._reported = False
+        self.each = True  # every frame paints
+        self._painted = False
+        self.window.centre.stack.scene.drawn.connect(self._note_painting)
         self._last, self._waited = time.perf_counter(), _waited()
         self._beat = QTimer()
         self._beat.timeout.connect(self._note)
@@ -86,12 +91,18 @@ class Bench:
         self._last, self._waited = now, waited
 
     def _frame(self) -> None:
+        self._painted = False
         begun, used = time.perf_counter(), time.thread_time()
         self.window.frames.tick()
-        self.window.centre.stack.refresh()
+        if self.each:
+            self.window.centre.stack.refresh()
         QApplication.sendPostedEvents(None, QEvent.Type.UpdateRequest)
-        self.frames.append(time.perf_counter() - begun)
-        self.used.append(time.thread_time() - used)
+        if self._painted:
+            self.frames.append(time.perf_counter() - begun)
+            self.used.append(time.thread_time() - used)
+
+    def _note_painting(self) -> None:
+        self._painted = True
 
     def until(self, done, longest: float) -> None:
         end = time.monotonic() + longest
@@ -219,6 +230,7 @@ def main(seconds: float) -> None:
         bench.measure("idle", seconds)
         window.setup.start()
         bench.until(lambda: session.source is not None, 30)
+        bench.each = False
         before = shares(session.link.pid)
         bench.measure("run in real time, simulated bench", min(seconds, 12.0))
         after = shares(session.link.pid)
@@ -228,6 +240,7 @@ def main(seconds: float) -> None:
             f"In the run the window took {parts[1]:.0f} % of a core, the engine "
             f"{parts[2]:.0f} %."
         )
+        bench.each = True
         session.stop("benchmark")
         bench.clear()
         bench.until(lambda: not session.busy, 20)

@@ -16,7 +16,9 @@ from PySide6.QtWidgets import (
 )
 
 from gui.app import FRAME, fit
+from gui.lanes.live import LiveSource
 from gui.parts import IconButton
+from tactile_lab.engine.jobs import follow_run
 
 
 def test_letters_are_shortcuts_only_outside_text_fields(lab) -> None:
@@ -137,6 +139,28 @@ def test_frames_lose_no_references(lab) -> None:
 
     before, after = frames(20), frames(80)
     assert after > before - 500
+
+
+def test_lanes_are_painted_where_something_was_told(lab) -> None:
+    """One frame in five or six of a run has nothing new: it was painted as well."""
+    window, session = lab.window, lab.session
+    session.source = LiveSource(None, 0.2)
+    window.centre.stack.show_source(session.source)
+    painted: list[int] = []
+    noted = window.centre.stack.scene.drawn.connect(lambda: painted.append(1))
+
+    def at_rest() -> bool:
+        painted.clear()
+        for _ in range(5):
+            window.frames.tick()
+            lab.app.processEvents()
+        return not painted
+
+    lab.until(at_rest, 20)
+    session.link.ask(lambda reply: None, follow_run, lab.folder)  # of no lab: nothing
+    lab.until(lambda: painted)
+    window.centre.stack.scene.drawn.disconnect(noted)
+    session.source = None
 
 
 def test_the_wheel_changes_no_choice(lab) -> None:
