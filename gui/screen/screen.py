@@ -158,7 +158,8 @@ class Screen(QObject):
         self._panels.session.log.add(
             Severity.INFO, "scene", f"{said}: {', '.join(new)}" if new else said
         )
-        if name is not None:
+        if name is not None:  # else it stands in for one that could not be opened
+            self._panels.centre.say("")
             self.scene_opened.emit(name)
         return True
 

@@ -94,6 +94,8 @@ def test_dropped_scene_is_loaded_and_dropped_run_is_opened(lab) -> None:
     assert window.centre.notice.isVisible()
     assert "levels" in window.centre.notice.text()
     assert window.setup.form.field("levels").text == "70 mN"
+    window.screen_.open_path(file)
+    assert not window.centre.notice.isVisible(), "it was of another scene"
 
 
 def test_view_is_exported(lab) -> None:
