@@ -166,6 +166,11 @@ class Coil(Protocol):
         ...
 
     @property
+    def grain(self) -> float:
+        """Smallest step of the set-point, A."""
+        ...
+
+    @property
     def acted(self) -> float:
         """When the source is taken to have acted on the last command, clock time, s."""
         ...

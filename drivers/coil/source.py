@@ -100,6 +100,11 @@ class CoilSource(SerialInstrument[CoilWire]):
         return self._setpoint
 
     @property
+    def grain(self) -> float:
+        """Smallest step of the set-point that the wire carries, A."""
+        return self.dialect.grain
+
+    @property
     def tripped(self) -> str | None:
         """Why the interlock latched, or None."""
         return self._interlock.tripped
@@ -192,6 +197,8 @@ class CoilSource(SerialInstrument[CoilWire]):
     def set_current(self, current: float) -> float:
         """Step towards `current`, A, as far as slew allows; what was commanded, A.
 
+        That is as the wire carries it: `grain` may part it from what was asked for.
+
         Raises:
             LimitError: not finite, beyond the limit, of a sign the source cannot
                 give, or the output is off.
@@ -208,7 +215,8 @@ class CoilSource(SerialInstrument[CoilWire]):
             self._setpoint = self._wire.setpoint()
         passed = min(now - self._commanded, max(2 * self._interval, CATCH_UP))
         step = self._limits.slew * passed + 0.5 * self.dialect.grain
-        wanted = min(max(current, self._setpoint - step), self._setpoint + step)
+        within = min(max(current, self._setpoint - step), self._setpoint + step)
+        wanted = self.dialect.fixed(within)
         self._commanded = now
         try:
             self._wire.set_current(wanted)

@@ -33,6 +33,10 @@ RESOLUTION = 2e-5
 """Set-points closer than this are the same to any source here, A."""
 
 
+ROUNDED = 0.6
+"""Of a source's smallest step: what it rounds to lies no farther."""
+
+
 ACTS = 0.76
 """Part of an exchange after which a source acts: a line is longer than its answer."""
 
@@ -264,7 +268,8 @@ class CoilThread(InstrumentThread):
         """Send the value of now if it changed, else read back now and then."""
         setpoint = float(waveform.at(min(now, self._until)))
         last = self.last
-        if last is None or abs(setpoint - last.setpoint) > RESOLUTION:
+        same = max(RESOLUTION, ROUNDED * self.coil.grain)
+        if last is None or abs(setpoint - last.setpoint) > same:
             commanded = self.coil.set_current(setpoint)
             heard, acted = self.clock.now(), self.coil.acted
             measured = None
@@ -279,7 +284,7 @@ class CoilThread(InstrumentThread):
             self.skipped += late
             self.source_late |= bool(done - now > now - due)
         self._next += interval * max(1, int((done - due) / interval))
-        arrived = self.last and abs(self.last.setpoint - setpoint) <= RESOLUTION
+        arrived = self.last and abs(self.last.setpoint - setpoint) <= same
         if now >= self._until and arrived:
             self._waveform = None
 

@@ -50,6 +50,8 @@ def test_plays_a_current_and_reads_it_back(bench):
     coil.energise()
     play(clock, coil, [0.5] * 10)
     assert far.setpoint == pytest.approx(0.5)
+    clock.sleep_until(clock.now() + coil.update_interval)
+    assert coil.set_current(0.4999963) == far.setpoint == 0.5, "as the wire carries it"
     clock.sleep_until(clock.now() + 0.2)
     assert coil.read_current().value == pytest.approx(0.5)
     assert coil._wire.voltage() == pytest.approx(2.5)
