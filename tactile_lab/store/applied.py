@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tactile_lab.analysis.estimate import Z95
 from tactile_lab.arrays import FloatArray
 from tactile_lab.scope import CLOCK_ERROR
 
@@ -26,6 +27,8 @@ VISIBLE = 0.03
 """Smallest step an edge of which the shunt shows, A: two codes."""
 ENOUGH = 5
 """So many edges seen tell how early the others came."""
+MANY = 20
+"""So many tell by their scatter how well each was seen."""
 BEFORE, AFTER = 0.06, 0.004
 """An edge is looked for so long before and after the host heard of the step, s."""
 BIN_TIME = 5e-4
@@ -50,6 +53,7 @@ class AppliedCurrent:
             others were moved as those next to them; 0 where there were too few.
         away: shape (n,): how long before the first of those or after the last each
             step came, s; 0 between them.
+        timing: half of the 95 % band to which the shunt dates them, s.
     """
 
     steps: FloatArray
@@ -57,12 +61,13 @@ class AppliedCurrent:
     edges: int
     lead: float
     away: FloatArray
+    timing: float = BIN_TIME
 
     def uncertainty(self, start: float = -np.inf, end: float = np.inf) -> float | None:
         """Half of the 95 % band of the steps' times against the samples, s.
 
-        A bin of the shunt, and what the clocks may part where it showed nothing any
-        more; None where it told too few, and the clocks alone do.
+        What the shunt leaves open (`timing`), and what the clocks may part where it
+        showed nothing any more; None where it told too few, and the clocks alone do.
 
         Args:
             start: from which time on steps are asked for, s.
@@ -71,7 +76,7 @@ class AppliedCurrent:
         if self.edges < ENOUGH:
             return None
         inside = (self.steps[:, 0] >= start) & (self.steps[:, 0] <= end)
-        return BIN_TIME + CLOCK_ERROR * float(self.away[inside].max(initial=0.0))
+        return self.timing + CLOCK_ERROR * float(self.away[inside].max(initial=0.0))
 
 
 def applied_current(
@@ -106,7 +111,7 @@ def applied_current(
     dated = np.broadcast_to(np.asarray(listed), t.shape)[first]
     own_clock = dated > 0
     begin, ends = t[first].copy(), np.append(t[first][1:], t[-1])
-    edges, lead, away = 0, 0.0, np.zeros(begin.size)
+    edges, lead, away, timing = 0, 0.0, np.zeros(begin.size), BIN_TIME
     if shunt is not None:
         seen = np.full(begin.size, np.nan)
         for i in np.flatnonzero(~own_clock[1:]) + 1:
@@ -117,6 +122,7 @@ def applied_current(
         if edges >= ENOUGH:
             early, at = begin[shown] - seen[shown], begin[shown]
             lead = float(np.median(early))
+            timing = _timing(at, early, coil_lag)
             moved = ~own_clock & (np.arange(begin.size) > 0)
             # the small ones came as early as those next to them that the shunt shows:
             # the clocks part in time
@@ -127,7 +133,29 @@ def applied_current(
     steps = np.column_stack([begin, level])
     by_host = bool(np.any(dated == BY_HOST))
     edges = 0 if by_host else edges + int(np.sum(dated == BY_SAMPLES))
-    return AppliedCurrent(steps, ends, edges, lead, away)
+    return AppliedCurrent(steps, ends, edges, lead, away, timing)
+
+
+def _timing(heard: FloatArray, early: FloatArray, coil_lag: float) -> float:
+    """Half of the 95 % band of a step's time, s: its bin, or less if they agree better.
+
+    What scatters between neighbours is how well edges are seen and how steadily the
+    host heard of them, so it holds for steps that were moved by their neighbours too.
+    What all edges share is that between two bins a current is taken to rise along a
+    line, where it bends by L/R.
+
+    Args:
+        heard: when the host heard of each step that was seen, s.
+        early: by how much it came before, s.
+        coil_lag: L/R, s; 0 where it is not known.
+    """
+    if heard.size < MANY or coil_lag <= 0:
+        return BIN_TIME
+    beside = (heard[1:-1] - heard[:-2]) / (heard[2:] - heard[:-2])
+    between = (1 - beside) * early[:-2] + beside * early[2:]
+    apart = (early[1:-1] - between) ** 2 / (1 + (1 - beside) ** 2 + beside**2)
+    scatter = math.sqrt(float(np.mean(apart)))
+    return min(BIN_TIME, math.hypot(Z95 * scatter, BIN_TIME**2 / (8 * coil_lag)))
 
 
 def _of_three(values: FloatArray) -> FloatArray:
