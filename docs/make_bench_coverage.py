@@ -533,15 +533,20 @@ runs that told none of theirs. "CPU" is of one run with all that it tells, the m
 
 Intervals that hold the truth more often than in 97 % hold a bound rather than a
 scatter, and the bound is seldom reached: half a code of a converter whose steps no
-noise smooths (V_GS of `wiring_check`, changes of I_DS), the 0.5 ms to which the edges
-of the current fix the clocks (phase at 0.8 Hz), the step at which a search ended (V_GS
-of `threshold_search`). `wiring_check` says that its numbers are bounds. A field's band
-is of those that came from saturation, as both fields told here do: these lie at the
-edge of the core's loop.
+noise smooths (V_GS of `wiring_check`, changes of I_DS), the step at which a search
+ended (V_GS of `threshold_search`). `wiring_check` says that its numbers are bounds. A
+field's band is of those that came from saturation, as both fields told here do: these
+lie at the edge of the core's loop.
 
-With the shunt `identify` tells its three numbers a fifth too widely (98.3 to 98.6 %),
-without it V_GS and I_bias by a quarter, which is not mended. The clocks' 0.5 ms are the
-likely cause with the shunt; that has not been shown.
+`identify` told its numbers too widely at 18db23b (98.3 to 98.6 % with the shunt; V_GS
+and I_bias 97.5 and 97.8 % without), since a spike that is seen late makes one interval
+longer and the next one shorter, and the two were taken to err by themselves: what they
+told scattered by a fifth of the variance that was said. Neighbours now tell how much of
+the scatter is of this kind. Two errors hid behind that, and were mended with it: V_C2
+was integrated across steps of the force (0.1 mV where a spike tells 0.01 mV), and the
+set-point was recorded as asked for, where the source takes 10 uA at a time. The phase
+at 0.8 Hz was too wide for the 0.5 ms of a bin by which edges of the current were dated;
+they are dated by how well they agree now, about 30 us.
 
 "One number repeated" is no evidence of coverage, however many runs gave it. Offset and
 gain of `wiring_check` are such: the probes on 0 V and V_S pass by all that is drawn,

@@ -4,6 +4,10 @@ Two kinds of evidence are used. V_C1, bin by bin. And each pair of neighbouring 
 with V_C2 set to V_reset at the earlier one, the model must reach V_fire at the later
 one. The second is smooth in the parameters, unlike a comparison of spike trains, whose
 number of spikes jumps.
+
+A spike that is seen late makes the interval before it too long and the one after it too
+short: the two err together, and in a long train nearly all of that cancels. How much of
+the intervals' scatter is of this kind, their own neighbours tell (`Scatter`).
 """
 
 from __future__ import annotations
@@ -11,9 +15,11 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.analysis.estimate import Z95, correlated
 from tactile_lab.analysis.twin import Measured
@@ -27,8 +33,12 @@ from tactile_lab.waveform import Waveform
 VOLTAGES = frozenset({"V_GS", "V_S", "V_th", "V_fire", "V_reset"})
 SCALES = {**dict.fromkeys(VOLTAGES, 0.01), "I_bias": 1e-10, "g31": 0.004}
 """Steps of parameters fitted as they are; all others are fitted by their logarithm."""
-STEP = 2e-3
-"""Grid on which I_C is integrated between spikes, s."""
+STEP = 1e-3
+"""I_C is integrated between spikes in steps no longer than this, s."""
+COMPUTED = 3e-7
+"""What computing V_C1 to 1e-7 V leaves open of V_C2 when it fires, V."""
+ROUNDS = 5
+"""So often variances are weighed by what they then are."""
 LEAST = 1e-9
 """Smallest scatter of any evidence, V."""
 OFFSET = "V_C1's offset"
@@ -63,10 +73,6 @@ class Residuals:
         self.bins = 0 if V_C1 is None else int(V_C1.time.size)
         self.offset = 0.0 if V_C1 is None else math.hypot(V_C1.resolution, V_C1.offset)
         self.size = self.bins + self._earlier.size
-        self._grids = [
-            np.linspace(a, b, max(8, int((b - a) / STEP)) | 1)
-            for a, b in zip(self._earlier, self._later, strict=True)
-        ]
 
     def circuit(self, x: FloatArray) -> Circuit:
         """The circuit at scaled parameters `x`, 0 where the start lies."""
@@ -102,23 +108,37 @@ class Residuals:
         parts = []
         if self._trace is not None:
             parts.append(self._trace.value - self._trace.modelled(found))
-        if self._grids:
-            everywhere = np.concatenate(self._grids)
+        if self._later.size:
+            grids = [
+                _grid(force.time, a, b)
+                for a, b in zip(self._earlier, self._later, strict=True)
+            ]
+            everywhere = np.concatenate(grids)
             current = I_C(circuit, found.sample("V_C1", everywhere)) + circuit.I_bias
-            parts.append(self._at_firing(circuit, current))
+            parts.append(_at_firing(circuit, grids, current))
         return np.concatenate(parts) if parts else np.empty(0)
 
-    def _at_firing(self, circuit: Circuit, current: FloatArray) -> FloatArray:
-        """V_C2 at each later spike, from V_reset at the earlier one, less V_fire."""
-        misses, at = np.empty(len(self._grids)), 0
-        for i, grid in enumerate(self._grids):
-            flowing = current[at : at + grid.size]
-            at += grid.size
-            left = np.exp((grid - grid[-1]) / circuit.tau_L)
-            charge = _simpson(flowing * left, grid) / circuit.C2
-            kept = circuit.reset_voltage * left[0]
-            misses[i] = charge + kept - circuit.fire_voltage
-        return misses
+    def late(self, driven: DrivenCircuit) -> FloatArray:
+        """What of V_C2 at firing a late spike changes, V/s, shape (pairs, 2).
+
+        Of the earlier spike, and of the later one.
+        """
+        circuit, force = driven
+        found = simulate(
+            circuit, force, keep=("V_C1",), until=self._duration, tolerance=1e-7
+        )
+        ends = np.column_stack([self._earlier, self._later])
+        current = I_C(circuit, found.sample("V_C1", ends.ravel())) + circuit.I_bias
+        at = np.array([circuit.reset_voltage, circuit.fire_voltage])
+        slope = current.reshape(ends.shape) / circuit.C2 - at / circuit.tau_L
+        left = np.exp((self._earlier - self._later) / circuit.tau_L)
+        return np.column_stack([-slope[:, 0] * left, slope[:, 1]])
+
+    @property
+    def follows(self) -> NDArray[np.bool_]:
+        """Which pair begins with the spike that the pair before ended with."""
+        shared: NDArray[np.bool_] = self._earlier[1:] == self._later[:-1]
+        return np.concatenate([[False], shared])[: self._later.size]
 
 
 class JointResiduals:
@@ -191,6 +211,24 @@ class JointResiduals:
         """A few millivolts for either kind of evidence, before anything is known."""
         return np.append(np.full(self.size, 1 / 5e-3), np.ones(len(self.causes)))
 
+    def intervals(
+        self, x: FloatArray, residual: FloatArray, held: float
+    ) -> Scatter | None:
+        """What scatter of the intervals consists of; None where there are none.
+
+        Args:
+            x: where a fit ended.
+            residual: there.
+            held: so many of the intervals the fit has taken up.
+        """
+        misses = residual[: self.size][~self.traced]
+        if not misses.size:
+            return None
+        pairs = zip(self._runs, self.driven(x), strict=True)
+        late = np.concatenate([run.late(one) for run, one in pairs])
+        follows = np.concatenate([run.follows for run in self._runs])
+        return Scatter.of(misses, late, follows, held)
+
     def weights(self, residual: FloatArray) -> FloatArray:
         """One over the scatter of each kind of evidence, of all runs; of causes 1.
 
@@ -212,13 +250,102 @@ class JointResiduals:
         return list(map(float, np.exp(factors)))
 
 
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """What the scatter of the intervals between spikes consists of.
+
+    Attributes:
+        timing: variance of a spike's time, s^2.
+        own: variance of each interval's own, V^2; larger where neighbours miss alike.
+        late: shape (pairs, 2): what a late spike changes, the earlier and later, V/s.
+        follows: shape (pairs,): which pair begins with the spike the last ended with.
+    """
+
+    timing: float
+    own: float
+    late: FloatArray
+    follows: NDArray[np.bool_]
+
+    @classmethod
+    def of(
+        cls,
+        misses: FloatArray,
+        late: FloatArray,
+        follows: NDArray[np.bool_],
+        held: float = 0.0,
+    ) -> Scatter:
+        """The variances, none below 0, that suit squares and neighbours' products best.
+
+        The pairs of a slow V_C2 tell what is their own, those of a fast one and what
+        neighbours have in common what is timing. A fit takes up what many pairs have
+        in common: of their own scatter, but hardly of timing, which cancels there.
+
+        Args:
+            misses: shape (pairs,), V.
+            late: as the attribute.
+            follows: as the attribute.
+            held: so many of the pairs a fit has taken up.
+        """
+        from scipy.optimize import nnls
+
+        each, one = np.sum(late**2, axis=1), np.ones(len(misses))
+        shared = np.where(follows[1:], late[1:, 0] * late[:-1, 1], 0.0)
+        design = np.block([[each, shared], [one, np.zeros_like(shared)]]).T
+        seen = np.append(misses**2, misses[1:] * misses[:-1])
+        timing, own = 0.0, float(np.mean(misses**2))
+        for _ in range(ROUNDS):
+            alone = np.maximum(timing * each + own, LEAST**2)
+            # of normal errors, squares scatter by root 2 times as much as products
+            spread = np.append(math.sqrt(2) * alone, np.sqrt(alone[1:] * alone[:-1]))
+            size = np.linalg.norm(design / spread[:, np.newaxis], axis=0)
+            found, _ = nnls(design / np.outer(spread, size), seen / spread)
+            timing, own = (float(value) for value in found / size)
+        own *= correlated(misses) * len(misses) / max(len(misses) - held, 1.0)
+        return cls(timing, max(own, COMPUTED**2), late, follows)
+
+    def covariance(self, gain: FloatArray) -> FloatArray:
+        """Of what the intervals move by `gain`, shape (n, pairs), per V; (n, n)."""
+        earlier, later = gain * self.late[:, 0], gain * self.late[:, 1]
+        # each spike once: by the pair it ends and, if there is one, the pair it begins
+        ended = later.copy()
+        ended[:, :-1] += np.where(self.follows[1:], earlier[:, 1:], 0.0)
+        first = earlier[:, ~self.follows]
+        timed = ended @ ended.T + first @ first.T
+        return np.asarray(self.timing * timed + self.own * (gain @ gain.T))
+
+
 def scatter(residual: FloatArray) -> float:
     """Root mean square, V."""
     return float(np.sqrt(np.mean(residual**2)))
 
 
+def _at_firing(
+    circuit: Circuit, grids: Sequence[FloatArray], current: FloatArray
+) -> FloatArray:
+    """V_C2 at each later spike, from V_reset at the earlier one, less V_fire."""
+    misses, at = np.empty(len(grids)), 0
+    for i, grid in enumerate(grids):
+        flowing = current[at : at + grid.size]
+        at += grid.size
+        left = np.exp((grid - grid[-1]) / circuit.tau_L)
+        charge = _simpson(flowing * left, grid) / circuit.C2
+        kept = circuit.reset_voltage * left[0]
+        misses[i] = charge + kept - circuit.fire_voltage
+    return misses
+
+
+def _grid(bends: FloatArray, start: float, end: float) -> FloatArray:
+    """Ends and middles of steps from `start` to `end` s that none of `bends` parts.
+
+    I_C bends where the force does, which a step across that would miss.
+    """
+    inside = bends[(bends > start) & (bends < end)]
+    even = np.linspace(start, end, max(4, math.ceil((end - start) / (2 * STEP))) + 1)
+    ends = np.unique(np.concatenate([even, inside]))
+    return np.insert(ends, np.arange(1, ends.size), (ends[1:] + ends[:-1]) / 2)
+
+
 def _simpson(values: FloatArray, grid: FloatArray) -> float:
-    """Integral over an even number of equal steps."""
-    step = (grid[-1] - grid[0]) / (grid.size - 1)
-    total = values[0] + values[-1] + 4 * values[1:-1:2].sum() + 2 * values[2:-1:2].sum()
-    return float(total * step / 3)
+    """Integral over steps whose ends and middles `grid` holds in turn."""
+    each = values[:-2:2] + 4 * values[1:-1:2] + values[2::2]
+    return float(np.diff(grid[::2]) @ each / 6)

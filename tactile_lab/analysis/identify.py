@@ -190,7 +190,11 @@ def _identified(
     unit = jacobian / lengths
     strength, direction = np.linalg.eigh(unit.T @ unit)
     inverse = direction / np.maximum(strength, 1e-14) @ direction.T
-    covariance = inverse / np.outer(lengths, lengths) * problem.size / freedom
+    covariance = inverse / np.outer(lengths, lengths)
+    gain = inverse @ unit.T / lengths[:, np.newaxis]
+    held = float(np.sum(np.linalg.qr(slope)[0][: problem.size][~problem.traced] ** 2))
+    covariance += _shared(problem, x, gain, weights, held)
+    covariance *= problem.size / freedom
     errors = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(errors, errors)
     values = problem.values(x)
@@ -208,6 +212,31 @@ def _identified(
         scatter_V_fire=scatter(fired) if fired.size else None,
         warnings=_warnings(estimates, correlation, float(strength[0])),
     )
+
+
+def _shared(
+    problem: JointResiduals,
+    x: FloatArray,
+    gain: FloatArray,
+    weights: FloatArray,
+    held: float,
+) -> FloatArray:
+    """Covariance of what is fitted, less that of independent intervals; shape (n, n).
+
+    Args:
+        problem: of which.
+        x: where the fit ended.
+        gain: what each weighed residual moves a parameter by, shape (n, all).
+        weights: of the residuals.
+        held: so many of the intervals the fit has taken up.
+    """
+    intervals = problem.intervals(x, problem.residual(x), held)
+    if intervals is None:
+        return np.zeros((len(gain), len(gain)))
+    paired = np.flatnonzero(~problem.traced)
+    alone = gain[:, paired]
+    shared = intervals.covariance(alone * weights[paired])
+    return np.asarray(shared - alone @ alone.T, dtype=np.float64)
 
 
 def _nearby(problem: JointResiduals) -> FloatArray:

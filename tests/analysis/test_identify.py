@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tactile_lab.analysis.evidence import Residuals, Scatter
 from tactile_lab.analysis.identify import Evidence, identify, identify_together
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.deviation import DrivenCircuit
@@ -206,3 +207,36 @@ def test_what_one_bench_does_not_know_is_not_averaged_away():
     one, many = (identify_together(r, ("V_GS",)).estimates["V_GS"] for r in several)
     assert one.half == pytest.approx(2e-3, rel=0.02)
     assert many.half == pytest.approx(2e-3, rel=0.02)
+
+
+@pytest.mark.parametrize("own", [0.0, 3e-4])
+def test_a_late_spike_makes_one_interval_longer_and_the_next_shorter(own):
+    """As independent scatter, lateness alone was told more than twice too widely."""
+    rng, repeats = np.random.default_rng(3), 400
+    late = np.column_stack([-np.linspace(3, 30, 40), np.linspace(3, 30, 40)])
+    follows = np.arange(40) > 0
+    gain, told = np.ones((1, 40)), []
+    moved = np.empty(repeats)
+    for k in range(repeats):
+        off = rng.uniform(-0.5e-6, 0.5e-6, 41)
+        misses = late[:, 0] * off[:-1] + late[:, 1] * off[1:]
+        misses += rng.normal(0, own, 40) if own else 0.0
+        found = Scatter.of(misses, late, follows)
+        told.append(found.covariance(gain)[0, 0])
+        moved[k] = np.sum(misses)
+        if k == 0 and not own:
+            assert found.timing == pytest.approx(1e-12 / 12, rel=0.6)
+            alone = replace(found, timing=0.0, own=np.mean(misses**2))
+            assert alone.covariance(gain)[0, 0] > 4 * told[0]
+    assert np.median(told) == pytest.approx(np.var(moved), rel=0.25)
+
+
+def test_steps_of_the_force_between_two_spikes_move_no_estimate():
+    """A rule that went across them was off by 0.1 mV where a spike tells 0.01 mV."""
+    steps = np.column_stack([np.arange(0, 0.4, 0.0457), np.linspace(0.0, 0.16, 9)])
+    stairs = Waveform.stairs(steps, 2.5)
+    true = Circuit()
+    made = simulate(true, stairs, keep=("spikes",))
+    seen = Residuals(true, ("V_GS",), stairs, 2.5, None, made.spike_times)
+    assert made.spike_times[0] < steps[-1, 0], "it fires while the force still rises"
+    assert np.abs(seen.under(DrivenCircuit(true, stairs))).max() < 1e-6
