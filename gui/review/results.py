@@ -83,6 +83,7 @@ class ResultsView(QWidget):
         self.answers: list[SmallPlot] = []
         """Of the report: the protocol's own plots."""
         self._steps: Sequence[MeasuredTrial] = ()
+        self._told: list[tuple[str, ...]] = []
         self._model: tuple[tuple[float, float], ...] = ()
         self._laws: tuple[FittedRate, ...] = ()
         self.drawn, self.against = Combo(), Combo()
@@ -242,12 +243,13 @@ class ResultsView(QWidget):
         self.report.setVisible(report)
 
     def _fill(self, steps: Sequence[MeasuredTrial], rows: int) -> None:
-        table = self.table
-        if table.rowCount() > len(steps):
+        table, told = self.table, [cells(step) for step in steps]
+        if self._told != told[: len(self._told)]:  # of another run
             table.setRowCount(0)
-        for at in range(table.rowCount(), len(steps)):
+        self._told = told
+        for at in range(table.rowCount(), len(told)):
             table.insertRow(at)
-            for where, text in enumerate(cells(steps[at])):
+            for where, text in enumerate(told[at]):
                 item = QTableWidgetItem(text)
                 item.setTextAlignment(RIGHT if where else LEFT)
                 item.setToolTip("" if where else text)

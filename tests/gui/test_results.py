@@ -70,6 +70,13 @@ def test_a_column_is_drawn_against_another(results: ResultsView) -> None:
     assert results._title.text() == "First spike against peak rate"
 
 
+def test_the_table_is_of_the_run_that_is_on_screen(results: ResultsView) -> None:
+    """Rows of the run before stayed where the next had as many steps, or more."""
+    results.show_steps([FAST, SILENT, SLOW], total=3, running=False, whole=True)
+    names = [results.table.item(at, 0).text() for at in range(3)]
+    assert names == ["160 mN", "40 mN", "80 mN"]
+
+
 def test_the_table_is_as_high_as_its_steps(results: ResultsView) -> None:
     """Below the one step of a hold was a gap of three rows."""
 
