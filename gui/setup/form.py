@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QWidget
 
 from gui.parts import column, empty
 from gui.setup.fields import Field
-from gui.setup.parameter import FieldText, parameter
+from gui.setup.parameter import FieldText, opened, parameter, value_at
 from tactile_lab.table import described
 from tactile_lab.trial import Protocol
 
@@ -116,11 +116,12 @@ class Form(QWidget):
         empty(self._rows)
         self._table = name
         self.fields, self.values = [], []
-        for key, info in keys.items():
-            wanted = parameter(key, info, said.get(key, ""))
-            plain = None if usual is None else usual.get(key)
-            value = FieldText(wanted, values.get(key, wanted.default), plain)
-            self.values.append(value)
+        for name, table in keys.items():
+            for key, info, words in opened(name, table, said.get(name, "")):
+                wanted = parameter(key, info, words)
+                plain = None if usual is None else value_at(usual, key)
+                text = FieldText(wanted, value_at(values, key, wanted.default), plain)
+                self.values.append(text)
         if not self._folded:
             self._make_fields()
         self.edits.clear()

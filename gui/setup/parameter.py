@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 import types
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -18,6 +19,7 @@ from pydantic.fields import FieldInfo
 
 from tactile_lab.complaint import reason
 from tactile_lab.quantity import DECIMAL_COMMA, Unit, exact, parse, printed, typed
+from tactile_lab.table import described, fields_of
 
 
 class Kind(Enum):
@@ -47,7 +49,7 @@ class FormField:
     """One key of a table as a form needs it.
 
     Attributes:
-        key: its name in the table.
+        key: its name in the table, with a dot before that in a table within.
         info: type, limits, default and description.
         kind: how it is edited.
         unit: of a quantity or of each of several; None otherwise.
@@ -72,11 +74,13 @@ class FormField:
         """
         if self.info.title:
             return self.info.title
-        if symbol := re.fullmatch(r"([A-Z]_[A-Za-z0-9]+)_([a-z_]+)", self.key):
+        table, _, name = self.key.rpartition(".")
+        key = f"{name}_{table}" if table else name
+        if symbol := re.fullmatch(r"([A-Z]_[A-Za-z0-9]+|[A-Z]\d)_([a-z_]+)", key):
             return f"{symbol[1]} {symbol[2].replace('_', ' ')}"
-        if len(self.key) < 3 or self.key[0].isupper() or self.key[-1].isdigit():
-            return self.key
-        words = self.key.replace("_", " ")
+        if len(key) < 3 or key[0].isupper() or key[-1].isdigit():
+            return key
+        words = key.replace("_", " ")
         return words[:1].upper() + words[1:]
 
     @property
@@ -168,7 +172,7 @@ def parameter(key: str, info: FieldInfo, about: str = "") -> FormField:
     choices: tuple[str, ...] = ()
     if get_origin(inner) is tuple and (items := _taken_apart(get_args(inner)[0])[2]):
         kind, units = Kind.QUANTITIES, items
-    elif get_origin(inner) is tuple and _taken_apart(get_args(inner)[0])[0] is str:
+    elif get_origin(inner) is tuple and _is_word(get_args(inner)[0]):
         kind = Kind.NAMES
     elif units:
         kind = Kind.QUANTITY if units[0].symbol else Kind.NUMBER
@@ -181,6 +185,43 @@ def parameter(key: str, info: FieldInfo, about: str = "") -> FormField:
     unit = units[0] if units else None
     about = about[:1].upper() + about[1:]
     return FormField(key, info, kind, unit, optional, choices, about)
+
+
+def opened(
+    key: str, info: FieldInfo, about: str = ""
+) -> Iterator[tuple[str, FieldInfo, str]]:
+    """A key of a table, or where it is a table itself, each of its own.
+
+    Yields:
+        Key with a dot before that of an inner table, type and default, what it is.
+    """
+    kind = info.annotation
+    inner = fields_of(kind)
+    words = described(kind) if inner and kind is not None else {}
+    if get_origin(kind) is dict and not info.is_required():
+        item = get_args(kind)[1]
+        for name, usual in info.get_default(call_default_factory=True).items():
+            inner[name] = FieldInfo.from_annotation(item)
+            inner[name].default = usual
+    if not inner:
+        yield key, info, about
+    for name, one in inner.items():
+        yield f"{key}.{name}", one, words.get(name, about)
+
+
+def value_at(values: Mapping[str, Any], key: str, otherwise: Any = None) -> Any:
+    """What a table has at a key as `opened` names it."""
+    name, _, within = key.partition(".")
+    value = values.get(name)
+    if within and value is not None:
+        inner = isinstance(value, Mapping)
+        value = value.get(within) if inner else getattr(value, within)
+    return otherwise if name not in values else value
+
+
+def _is_word(kind: Any) -> bool:
+    inner = _taken_apart(kind)[0]
+    return inner is str or get_origin(inner) is Literal
 
 
 def _taken_apart(kind: Any) -> tuple[Any, bool, list[Unit]]:
@@ -210,7 +251,8 @@ def text_of(parameter: FormField, value: Any) -> str:
     if parameter.kind is Kind.NAMES:
         return ", ".join(value)
     if parameter.kind is Kind.OTHER:
-        return toml(parameter.type.dump_python(value))
+        held = parameter.type.dump_python(value)
+        return held if isinstance(held, str) else toml(held)
     if parameter.kind is Kind.SWITCH:
         return toml(value)
     return str(value)
@@ -242,7 +284,7 @@ def entry_of(parameter: FormField, text: str) -> str | None:
     if not text:
         return None
     if parameter.kind is Kind.OTHER:
-        return text
+        return toml(text) if re.fullmatch(r"[a-z]+", text) else text
     value = _value(parameter, text)
     try:
         parameter.type.validate_python(value)
@@ -298,7 +340,7 @@ def toml(value: Any) -> str:
     """A value in one line of TOML."""
     if isinstance(value, dict):
         inner = ", ".join(f"{key} = {toml(item)}" for key, item in value.items())
-        return f"{{ {inner} }}"
+        return f"{{ {inner} }}" if inner else "{}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(toml(item) for item in value)}]"
     return json.dumps(value, ensure_ascii=False)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.plot import Plot
-from tactile_lab.quantity import count
+from tactile_lab.quantity import count, show
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
 from tactile_lab.store.folder import lock, write_json
@@ -119,8 +119,19 @@ class SeenPoint:
     address: str
 
     def __str__(self) -> str:
-        told = ", ".join(self.changes).replace("=", " = ")
+        told = ", ".join(_told(change) for change in self.changes)
         return f"{told}: {self.reason}" if self.reason else told
+
+
+def _told(change: str) -> str:
+    """``key=value`` for a person: "sensor.R_L = 9 MΩ"."""
+    key, _, value = change.partition("=")
+    number, _, unit = value.strip('["]').partition(" ")
+    try:
+        value = show(float(number), unit).replace("Ohm", "Ω") if unit else value
+    except ValueError:
+        pass  # a word
+    return f"{key} = {value}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,6 +60,33 @@ def test_what_is_not_changed_is_not_said(lab, tables) -> None:
     assert all(text.startswith("protocol.") for text in texts)
 
 
+def test_a_table_within_a_table_has_fields_of_its_own(lab, tables) -> None:
+    """The noise of the channels stood in one field, as TOML with braces and quotes."""
+    form = tables.form("simulated")
+    assert form.value("noise.V_K").text == "20 mV"
+    assert form.value("noise.V_K").parameter.title == "V_K noise"
+    assert form.value("deviation.R1").parameter.title == "R1 deviation"
+    put(lab, "simulated", "noise.V_K", "30 mV")
+    put(lab, "simulated", "deviation.offset", "2 mV")
+    scene = loaded(lab)
+    assert scene.simulated.noise["V_K"] == 0.03
+    assert scene.simulated.noise["V_C1"] == 5e-3, "the others stay"
+    assert scene.simulated.deviation.offset == 2e-3
+    assert "Simulated bench · 2 changes" in tables.sections["simulated"].head.text()
+
+
+def test_words_of_a_table_stand_without_quotes(lab, tables) -> None:
+    sensor = tables.form("sensor")
+    assert sensor.value("start").text == "equilibrium"
+    put(lab, "sensor", "sourced", "V_GS V_S")
+    put(lab, "sensor", "start", '{ V_P = "0 V", V_C1 = "1 V", V_C2 = "0 V" }')
+    scene = loaded(lab)
+    assert scene.sensor.sourced == ("V_GS", "V_S")
+    assert scene.sensor.start.V_C1 == 1.0
+    put(lab, "sensor", "start", "equilibrium")
+    assert loaded(lab).sensor.start == "equilibrium"
+
+
 def test_a_signal_that_does_not_exist_is_refused_with_the_nearest(lab, tables) -> None:
     put(lab, "record", "signals", "V_C1, spike")
     assert "spikes" in tables.form("record").problem

@@ -89,7 +89,7 @@ def test_a_click_on_a_cell_puts_its_scene_into_the_form(lab, tmp_path: Path) -> 
     assert opened.pop().name and not card.isVisible()
     card.show_studies((tmp_path,))
     lab.app.processEvents()
-    assert "V_GS = 1.4 V, sensor.R1 = 10000000.0 Ohm" in figure.tell(13)
+    assert "V_GS = 1.4 V, sensor.R1 = 10 MΩ" in figure.tell(13)
     click(1.38, -1.0, lambda: "R1 = -1e+06 Ohm must lie betw" in card.hint.text())
     assert card.isVisible() and not opened
     click(1.401, 10.1, lambda: opened)
