@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Self
 
@@ -150,11 +150,7 @@ class SineSweep(ForceProtocol):
         expected = _gains(run, self._by_label, model=True)
         if not found:
             return Conclusion(missing=cut or ("No gain: no frequency was completed.",))
-        told = "; ".join(
-            f"{frequency} {size} V/N at {phase}°"
-            for frequency, size, phase, *_ in (_row(g, None) for g in found)
-        )
-        said = [printed(f"V_C1 answers force with {told} (95 %).")]
+        said = [_summary(found)]
         if run.force_uncertainty is None:
             said.append(NOT_STATED)
         beside = {e.frequency: e for e in expected}
@@ -284,6 +280,20 @@ def _gains(
             continue  # it was cut short
         found.append(answer if model else _known(run, trial, answer))
     return found
+
+
+def _summary(found: Sequence[Gain]) -> str:
+    """Gain and phase from the lowest frequency to the highest, in a sentence."""
+    first, last = (_row(gain, None) for gain in (found[0], found[-1]))
+    if len(found) == 1:
+        return (
+            f"At {first[0]} the gain of V_C1 over force is {first[1]} V/N, its phase "
+            f"{first[2]}° (95 %)."
+        )
+    return (
+        f"From {first[0]} to {last[0]} the gain of V_C1 over force goes from "
+        f"{first[1]} to {last[1]} V/N, its phase from {first[2]}° to {last[2]}° (95 %)."
+    )
 
 
 def _row(found: Gain, model: Gain | None) -> tuple[str, ...]:

@@ -62,7 +62,7 @@ class PreferencesCard(Overlay):
             *(note, line(), *self.switches.values()),
         )
         area = with_gutter(scrolling(page), column(page, *parts, spacing=12))
-        foot = row(STRETCH, self.close_button, self.save)
+        foot = row(STRETCH, self.close_button, self.save, spacing=12)
         whole = label("Settings", "big"), area, foot
         # its scroll bar lies in the card's margin: fields end where Save does
         rows = stack(self.card, whole, area, spacing=12)

@@ -58,12 +58,16 @@ class GuardedLine(pg.InfiniteLine):  # type: ignore[misc]
     paint = guarded(pg.InfiniteLine.paint)
 
 
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
 def _power(value: float) -> str:
     """10 to the power of `value`, which is a digit and zeros, as people write it."""
     ten = math.floor(value + 1e-9)
     if -3 <= ten <= 3:
         return f"{10**value:.{max(0, -ten)}f}"
-    return f"{10 ** (value - ten):.0f}e{ten}".replace("-", "−")
+    digit, power = f"{10 ** (value - ten):.0f}", f"10{str(ten).translate(RAISED)}"
+    return power if digit == "1" else f"{digit}·{power}"
 
 
 class RoundAxis(pg.AxisItem):  # type: ignore[misc]

@@ -348,8 +348,12 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         """What a map's colours mean."""
         by, text = z_scale(s)
         low, high = (f"{end * by:.4g}" for end in levels(s))
+        known = np.unique(np.asarray(s.z)[np.isfinite(s.z)])
         bar = "".join(_rich("■", shade) for shade in shades())
-        return f"{_rich(text, self._tokens.text)} &nbsp;{low} {bar} {high}"
+        key = f"{low} {bar} {high}"
+        if known.size < 2:  # a scale would make up the values at its ends
+            key = f"all {known[0] * by:.4g}" if known.size else "no value"
+        return f"{_rich(text, self._tokens.text)} &nbsp;{key}"
 
     def _guide(self, guide: Guide) -> None:
         across = guide.along == "x"

@@ -256,7 +256,8 @@ def _adaptation(steps: Sequence[MeasuredTrial], model: Sequence[MeasuredTrial]) 
         except NotIdentifiableError as reason:
             why = _capital(str(reason)) if why == "No step has fired." else why
             continue
-        span = f"{found.low:.2g} to {found.high:.2g} s at {step.label}"
+        value, _, span = found.text("s").partition(" (")
+        span = f"{span.removesuffix(', 95 %)')} {_where(step)}"
         beside = ""
         try:
             own = fit_adaptation(model[at].spike_times, step.hold) if model else None
@@ -264,7 +265,7 @@ def _adaptation(steps: Sequence[MeasuredTrial], model: Sequence[MeasuredTrial]) 
                 beside = f"model {own.time_constant.value:.2g} s"
         except NotIdentifiableError:
             beside = "model: none"
-        return Card(name, f"{found.value:.3g} s", span, beside)
+        return Card(name, value, span, beside)
     return Card(name, "—", why)
 
 
@@ -274,11 +275,17 @@ def _fall(steps: Sequence[MeasuredTrial], model: Sequence[MeasuredTrial]) -> Car
     if not fell:
         return Card("Fall in the hold", "—", "No step has fired often enough.")
     at = max(fell, key=lambda number_: steps[number_].level or 0.0)
-    text = f"at {steps[at].label}"
+    text = _where(steps[at])
     theirs = model[at].response.fall if model else None
     beside = "" if theirs is None else f"model {100 * theirs:.0f} %"
     value = f"{100 * (steps[at].response.fall or 0.0):.0f} %"
     return Card("Fall in the hold", value, text, beside)
+
+
+def _where(step: MeasuredTrial) -> str:
+    """Where a number is of: at 150 mN, but in 8 ms as that stands."""
+    amount = step.label.lstrip("−-")[:1].isdigit()
+    return f"at {step.label}" if amount else step.label
 
 
 def _agreement(measured: Trace, model: Trace) -> Agreement | None:

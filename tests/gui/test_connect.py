@@ -151,6 +151,9 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
     window.actions_.connect_dialog()
     dialog = window.findChild(Connect)
     dialog.show_page(1)
+    session.status.enter(WindowState.FAULT)
+    assert dialog.wiring.progress.text() == "Acknowledge the fault first."
+    session.status.enter(WindowState.READY)
     dialog.wiring.check.click()
     assert window.setup.kind_name == "wiring_check", "the form shows what is run"
     assert not dialog.wiring.check.isEnabled()

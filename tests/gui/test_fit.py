@@ -57,6 +57,26 @@ def test_cards_tell_onset_slope_and_why_not() -> None:
     assert cards["Adaptation 1/|β|"].detail.endswith(".")
 
 
+def test_the_ends_of_an_interval_are_told_apart_and_where_it_is_in_words() -> None:
+    """10.8 s stood above "11 to 11 s", and 10 % above "at in 8 ms"."""
+    phases = np.arange(1.0, 250.0)
+    time = np.linspace(0.0, 60.0, 600_001)
+    rate = 11.4 * np.exp(-time / 11.0) + 2.8
+    whole = np.concatenate([[0.0], np.cumsum(rate[:-1] * np.diff(time))])
+    train = np.interp(phases[phases < whole[-1]], whole, time)
+    held = replace(STEPS[3], spike_times=train, hold=(0.0, 60.0), label="in 8 ms")
+    cards = {card.name: card for card in fit([held], seen()).cards}
+    low, high = re.findall(r"[\d.]+(?= to )|(?<= to )[\d.]+", (
+        cards["Adaptation 1/|β|"].detail
+    ))  # fmt: skip
+    assert low != high and cards["Adaptation 1/|β|"].detail.endswith(" s in 8 ms")
+    assert cards["Fall in the hold"].detail == "in 8 ms"
+    cards = {
+        card.name: card for card in fit([replace(held, label="50 mN")], seen()).cards
+    }
+    assert cards["Fall in the hold"].detail == "at 50 mN"
+
+
 def test_first_steps_say_what_is_missing() -> None:
     cards = {card.name: card for card in fit(STEPS[:1], seen()).cards}
     assert cards["Onset"].value == "—" and "no force" in cards["Onset"].detail.lower()

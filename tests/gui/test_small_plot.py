@@ -1,6 +1,7 @@
 """The plots in the window, as painted."""
 
 import gc
+import re
 import weakref
 from dataclasses import replace
 from typing import get_args
@@ -211,8 +212,8 @@ def test_every_mark_is_drawn(app):
 @pytest.mark.parametrize(
     "low, high, told",
     [
-        (1.0, 1e5, ["1", "10", "100", "1000", "1e4", "1e5"]),
-        (2e-6, 3e-5, ["2e−6", "5e−6", "1e−5", "2e−5"]),
+        (1.0, 1e5, ["1", "10", "100", "1000", "10⁴", "10⁵"]),
+        (2e-6, 3e-5, ["2·10⁻⁶", "5·10⁻⁶", "10⁻⁵", "2·10⁻⁵"]),
         (3.2, 4.7, ["4"]),
         (0.03, 0.07, ["0.03", "0.04", "0.05", "0.06", "0.07"]),
     ],
@@ -222,3 +223,16 @@ def test_a_logarithmic_axis_of_less_than_two_powers_has_numbers(app, low, high, 
     axis.logMode = True
     ((step, values),) = axis.tickValues(np.log10(low), np.log10(high), 200)
     assert axis.tickStrings(values, 1.0, step) == told
+
+
+@pytest.mark.parametrize(
+    "z, told",
+    [([0.0, 0.0], "all 0"), ([np.nan, np.nan], "no value"), ([0.0, 2.0], "■ 2")],
+)
+def test_a_map_of_one_value_makes_up_no_scale(app, z, told):
+    """Nine points without a spike stood under a scale from 0 to 1e-12."""
+    cells = Series(name="count", x=[0.0, 1.0], y=[0.0, 0.0], z=z, mark="cells")
+    view, panel = SmallPlot(Theme("light")), Panel(label="y", series=(cells,))
+    view.show_plot(Plot(name="one", caption="", x_label="x", panels=(panel,)))
+    heading = re.sub(r"<[^>]*>", "", view.panels[0]._heading("y"))
+    assert heading.endswith(told), heading
