@@ -70,7 +70,7 @@ class QueueCard(QFrame):
                 button.clicked.connect(told)
                 self.buttons[icon] = button
                 top.addWidget(button)
-            elif icon != "edit":  # the others stay below each other
+            elif icon != "edit" and count > 1:  # they stay below each other
                 top.addSpacing(BUTTON)
         whole.addLayout(top)
         whole.addWidget(Elided(cost, "small"))

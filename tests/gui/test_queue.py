@@ -90,6 +90,11 @@ def test_rows_are_moved_and_taken_out_by_their_buttons(lab) -> None:
     press("Move three up")
     press("Take two out of the queue")
     assert [item.title for item in session.queue.items] == ["three", "one"]
+    press("Take one out of the queue")
+    lab.app.processEvents()
+    parts = window.setup.queue.cards[0].parts
+    gap = parts["close"].x() - parts["edit"].geometry().right()
+    assert gap < 10, "the pencil of a single run stood in the middle of its row"
     idle(lab)
 
 
