@@ -36,6 +36,9 @@ AIR = 6
 """Height above a plot without a heading, for the number at the end of its axis, px."""
 NEAR = 0.04
 """Share of the width within which a text at an edge stands inside of it."""
+RIGHT = 14
+"""Margin on the right, px: half of a number at the end of an axis."""
+
 WIDEST = 1e4
 """Width of a heading where nothing limits it, px."""
 SIZE = 7.6
@@ -145,7 +148,7 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self.setCacheMode(pg.GraphicsView.CacheModeFlag.CacheNone)
         self.setAntialiasing(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.ci.setContentsMargins(0, AIR if height else 0, 8, 0)
+        self.ci.setContentsMargins(0, AIR if height else 0, RIGHT, 0)
         self.ci.setSpacing(0)
         theme.changed.connect(self.draw)
         self.draw()
@@ -348,7 +351,8 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         """What a map's colours mean."""
         by, text = z_scale(s)
         low, high = (f"{end * by:.4g}" for end in levels(s))
-        known = np.unique(np.asarray(s.z)[np.isfinite(s.z)])
+        values = np.asarray(s.z, dtype=np.float64)
+        known = np.unique(values[np.isfinite(values)])
         bar = "".join(_rich("■", shade) for shade in shades())
         key = f"{low} {bar} {high}"
         if known.size < 2:  # a scale would make up the values at its ends

@@ -125,8 +125,8 @@ class RunsView(QWidget):
             self._show()
 
     def show_current(self, folder: Path | None) -> None:
-        """Mark the run on screen."""
-        self._current = folder
+        """Mark the run on screen; a file dialog names its folder in full."""
+        self._current = None if folder is None else folder.absolute()
         self._choose(None if folder is None else self._entry(folder))
 
     def newest(self, most: int) -> list[RunSummary]:
@@ -156,7 +156,8 @@ class RunsView(QWidget):
         return menu
 
     def _entry(self, folder: Path) -> RunSummary | None:
-        return next((one for one in self._entries if one.folder == folder), None)
+        named = folder.absolute()
+        return next((e for e in self._entries if e.folder.absolute() == named), None)
 
     def _emit_chosen(self, asked: Any, *_: object) -> None:
         if self._chosen is not None:
@@ -207,7 +208,7 @@ class RunsView(QWidget):
             self._rows.addWidget(more)
         self._rows.addStretch(1)
         self._count.setText(count(len(fitting), "run"))
-        on_screen = next((e for e in listed if e.folder == self._current), None)
+        on_screen = next(filter(self._on_screen, listed), None)
         self._choose(self._chosen if self._chosen in listed else on_screen)
         if focused is not None:
             there = [card for card in self.cards if card.entry.folder == focused]
@@ -253,10 +254,13 @@ class RunsView(QWidget):
             if card.entry.folder == folder:
                 card.thumbnail.show_thumbnail(self.thumbnails.of(folder))
 
+    def _on_screen(self, entry: RunSummary) -> bool:
+        return entry.folder.absolute() == self._current
+
     def _choose(self, entry: RunSummary | None) -> None:
         self._chosen, first = entry, next(iter(self.cards), None)
         for card in self.cards:
-            shown = card.entry.folder == self._current
+            shown = self._on_screen(card.entry)
             card.mark(chosen=card.entry == entry, shown=shown)
             card.stop_tab(card.entry == entry or (entry is None and card is first))
         self._buttons()

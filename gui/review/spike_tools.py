@@ -86,14 +86,15 @@ class SpikeTools(QObject):
     def step(self, way: int) -> None:
         """On to the next spike (1), or back to the one before (-1).
 
-        From the chosen one while that is in view, else from the middle of the view.
+        From the chosen one while that is in view, else from an edge of the view: first
+        the first spike in it, or the last.
         """
         view, spikes = self._lanes.view, self._source.spikes
         if not spikes.size:
             return
         at = view.spike
         if at is None or not view.start <= at <= view.end:
-            at = view.start + view.width / 2
+            at = view.start if way > 0 else view.end
         if way > 0:
             found = int(np.searchsorted(spikes, at, side="right"))
         else:

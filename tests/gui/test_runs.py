@@ -55,8 +55,10 @@ def test_nothing_can_be_done_before_a_run_is_chosen(runs: RunsView) -> None:
     assert opened == [ENTRIES[1]]
 
 
-def test_run_on_screen_is_marked_and_chosen(runs: RunsView) -> None:
-    runs.show_current(Path("c"))
+@pytest.mark.parametrize("folder", [Path("c"), Path("c").absolute()])
+def test_run_on_screen_is_marked_and_chosen(runs: RunsView, folder: Path) -> None:
+    """Also one that a file dialog named in full, where the list's are relative."""
+    runs.show_current(folder)
     assert [c.accessibleName().endswith("on screen") for c in runs.cards] == [
         True, False, False,
     ]  # fmt: skip

@@ -57,6 +57,9 @@ def test_keys_go_from_spike_to_spike(lab) -> None:
     lab.until(lambda: window.session.opened == (folder.name,))
     spikes = window.screen_.run.spikes
     window.actions_._tab(3)
+    view.show_all()
+    QTest.keyClicks(window.page, ".")
+    assert view.spike == spikes[0], "not the last, that follows the middle of a run"
     view.show_span(0.0, 0.2)
     assert spikes[0] > 0.2
     QTest.keyClicks(window.page, "..")
