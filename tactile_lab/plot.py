@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -210,13 +210,20 @@ class Plot:
         return cls(**{**data, "panels": panels})
 
 
-def spike_train(spikes: FloatArray, begin: float, end: float) -> tuple[Panel, str]:
+def spike_train(
+    spikes: FloatArray,
+    begin: float,
+    end: float,
+    looked: Sequence[tuple[float, float]] | None = None,
+) -> tuple[Panel, str]:
     """A lane of ticks, and its caption; many spikes as how many a second there are.
 
     Args:
         spikes: times, s.
         begin: of the x axis, s.
         end: of the x axis, s.
+        looked: (start, end), s, ascending, where spikes were looked for, as far as
+            they can lie; None for all of the axis.
     """
     told = count(spikes.size, "spike")
     if spikes.size <= MOST_TICKS:
@@ -225,13 +232,36 @@ def spike_train(spikes: FloatArray, begin: float, end: float) -> tuple[Panel, st
             label="Spikes", series=(ticks,), limits=(0, 1), blank=True, height=0.3
         )
         return panel, f"{told}"
-    bins = min(spikes.size // SPIKES_IN_BIN, MOST_BINS)
-    edges = np.linspace(begin, end, bins + 1)
-    density = np.histogram(spikes, edges)[0] / np.diff(edges)
-    middles = (edges[:-1] + edges[1:]) / 2
-    filled = Series(x=middles, y=density, mark="filled", colour="V_K")
+    wanted = min(spikes.size // SPIKES_IN_BIN, MOST_BINS)
+    spans = _joined([(begin, end)] if looked is None else looked)
+    width = sum(stop - start for start, stop in spans) / wanted
+    x: list[FloatArray] = []
+    y: list[FloatArray] = []
+    bins = 0
+    for start, stop in spans:
+        here = max(round((stop - start) / width), 1)
+        edges = np.linspace(start, stop, here + 1)
+        density = np.histogram(spikes, edges)[0] / np.diff(edges)
+        # where nobody looked there is no rate, which is not a rate of none
+        x += [np.repeat(edges, 2)[1:-1], edges[-1:]]
+        y += [np.repeat(density, 2), np.full(1, np.nan)]
+        bins += here
+    filled = Series(
+        x=np.concatenate(x), y=np.concatenate(y), mark="filled", colour="V_K"
+    )
     panel = Panel(label="Spikes/s", series=(filled,), limits=(0, None), height=0.5)
     return panel, f"{told}: how many a second, in {bins} bins"
+
+
+def _joined(spans: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Ascending stretches; those that touch or overlap are one."""
+    found: list[tuple[float, float]] = []
+    for start, stop in spans:
+        if found and start <= found[-1][1] + 1e-6:
+            start, stop = found[-1][0], max(found.pop()[1], stop)
+        if stop > start:
+            found.append((start, stop))
+    return found
 
 
 def y_scale(panel: Panel) -> tuple[float, str]:

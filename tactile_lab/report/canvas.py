@@ -65,6 +65,7 @@ HEADING = "heading"
 BESIDE = "beside"
 """Names the texts of a series that is drawn as texts alone."""
 DASHES, DOTS = (0, (4, 2)), (0, (1, 2.5))
+DPI = 160
 MANY, MOST = 60, 200
 """So many points are drawn smaller."""
 
@@ -83,7 +84,8 @@ def draw(
     heights = [panel.height for panel in plot.panels]
     high = max(heights) if plot.beside else sum(heights) + GAP * (len(heights) - 1)
     with rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, FOOT + high + HEAD_HEIGHT))
+        size = WIDTH, FOOT + high + HEAD_HEIGHT
+        figure = Figure(figsize=size, dpi=DPI)  # texts are measured as they are drawn
         FigureCanvasAgg(figure)
         factor, x_text = plot.x_scale()
         drawn = _boxes(figure, plot)
@@ -403,7 +405,7 @@ def save(figure: Figure, stem: Path, *, pdf: bool = False) -> tuple[Path, str]:
     png, buffer = stem.with_suffix(".png"), io.StringIO()
     with rc_context(STYLE):
         with replacing(png) as new:
-            figure.savefig(new, dpi=160, pil_kwargs={"compress_level": 3})
+            figure.savefig(new, pil_kwargs={"compress_level": 3})
         if pdf:
             with replacing(stem.with_suffix(".pdf")) as new:
                 figure.savefig(new)

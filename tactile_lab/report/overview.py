@@ -223,7 +223,9 @@ def _spikes(run: Measurement, axis: ClosedTime) -> list[Told]:
     trials = run.results
     starts = [axis.at(t.start) for t in trials]
     spikes = [t.spike_times + at for t, at in zip(trials, starts, strict=True)]
-    train = spike_train(np.concatenate([*spikes, []]), axis.begin, axis.end)
+    looked = [(at, at + t.duration) for t, at in zip(trials, starts, strict=True)]
+    every = np.concatenate([*spikes, []])
+    train = spike_train(every, axis.begin, axis.end, looked)
     at, rates = _rates(spikes)
     if not rates.size:
         return [train]

@@ -11,6 +11,7 @@ from protocols.hold import Hold
 from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.plot import spike_train
 from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import sensor_texts
 from tactile_lab.report.html import rendered
@@ -329,6 +330,18 @@ def test_many_spikes_are_drawn_as_their_density(demo):
     (density,) = panel_of(replace(demo, trials=(trial,)), "Spikes/s").series
     inside = (density.x > 0.7) & (density.x < 3.8)
     assert density.y[inside] == pytest.approx(100, rel=0.1)
+
+
+def test_no_density_of_spikes_is_drawn_where_nobody_looked():
+    """A zero line crossed the half minute in which a list was loaded."""
+    spikes = np.concatenate([np.linspace(1, 2, 100), np.linspace(41, 42, 100)])
+    panel, told = spike_train(spikes, 0.0, 50.0, [(0, 2), (2, 4), (40, 44)])
+    (density,) = panel.series
+    known = np.isfinite(density.y)
+    assert not np.any((density.x[known] > 4) & (density.x[known] < 40))
+    area = np.nansum(density.y[:-1] * np.diff(density.x))
+    assert area == pytest.approx(200), "each spike once"
+    assert told == "200 spikes: how many a second, in 40 bins"
 
 
 def test_a_hold_is_shaded_from_when_its_force_was_there(demo):
