@@ -88,8 +88,8 @@ class ThresholdSearch(Recovering):
         yield from rate_against_force(
             run,
             "Highest rate in the hold, where it has two spikes or more, and number of "
-            "spikes of each trial against its force; open: silent. Grey band: the "
-            "critical force lies within.",
+            "spikes of each trial against its force; open: too few spikes for a "
+            "rate, or none. Grey band: the critical force lies within.",
         )
 
 

@@ -185,7 +185,8 @@ class Touch(ForceProtocol):
             headings=("Onset", "10 to 90 %", "Spikes", "Latency", "Fastest rate"),
             rows=rows,
             note="Least to largest of the touches. Latency: from half the force as "
-            "applied to the first spike.",
+            "applied to the first spike; spikes: from there to the end of the hold, "
+            "those of the release left out.",
         )
 
 

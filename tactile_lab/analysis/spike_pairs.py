@@ -85,7 +85,8 @@ class Matched:
         measured = self.measured.size + self.extra
         text = f"{self.measured.size} of {measured} spikes matched"
         if self.missed:
-            text += f", {self.missed} predicted ones missing"
+            ones = "one" if self.missed == 1 else "ones"
+            text += f", {self.missed} predicted {ones} missing"
         if self.offsets.size:
             middle = rounded(np.median(self.offsets) * 1e3)
             largest = rounded(np.max(np.abs(self.offsets)) * 1e3)

@@ -164,18 +164,21 @@ def sentences(beside: BesideModel, run: Measurement) -> tuple[str, ...]:
             f"{beside.explanation.text}"
         )
     for residual in found.residuals:
-        shifted = (
-            "; while it fires, spikes that come early or late make volts of difference"
-            if residual.signal == "V_C2" and found.spikes is not None
-            else ""
-        )
+        shifted, known = "", residual.tolerance
+        if residual.signal == "V_C2" and found.spikes is not None:
+            shifted = (
+                "; while it fires, spikes that come early or late make volts of "
+                "difference"
+            )
+            # times as uncertain as an interval leave open all of its swing, no more
+            known = np.minimum(known, np.ptp(residual.predicted))
         # adding 0 makes a rounded -0 plain
         offset = printed(f"{round(residual.offset * 1e3, 1) + 0.0:+.1f}")
         said.append(
             f"{residual.signal}: measured less model is {offset} mV on average, "
             f"{residual.rms * 1e3:.1f} mV rms, within {residual.band * 1e3:.1f} mV for "
             f"95 % of the time; {100 * residual.within:.0f} % lie within their "
-            f"tolerance, {_ranging(residual.tolerance * 1e3, 'mV')}{shifted}."
+            f"tolerance, {_ranging(known * 1e3, 'mV')}{shifted}."
         )
     if found.spikes is not None:
         text = f"Spikes: {found.spikes.sentence}"
@@ -207,7 +210,7 @@ def twin_plot(run: Measurement, twin: Twin) -> Plot | None:
         said.append("V_C1")
     if matched is not None and matched.offsets.size:
         panels += _matched(matched, axis)
-        said += ["Times of matched spikes", "Rate 1/ISI"]
+        said += ["Times of matched spikes", "Rate 1/ISI"][: len(panels) - len(said)]
     if not panels:
         return None
     parts = " ".join(f"({'abc'[i]}) {text}." for i, text in enumerate(said))
@@ -276,6 +279,8 @@ def _matched(
         ("Rate", "%", matched.rated, 100 * matched.rate_error,
          100 * matched.rate_tolerance),
     ):  # fmt: skip
+        if not value.size:  # one spike has no rate
+            continue
         # tolerances grow beyond all bounds where a spike only just comes
         known = tolerance[np.isfinite(tolerance)]
         usual = float(np.median(known)) if known.size else 0.0

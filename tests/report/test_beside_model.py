@@ -1,6 +1,7 @@
 """The model beside a run of the simulated bench knows the bench, or says what not."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
 from tactile_lab.report.identified import identify_run
 from tactile_lab.report.results import results
-from tactile_lab.report.twin import sentences
+from tactile_lab.report.twin import sentences, twin_plot
 from tactile_lab.scene.load import load
 
 SHORT = {
@@ -52,6 +53,29 @@ def test_a_tolerance_that_goes_beyond_its_panel_is_marked(as_believed):
         assert cut == sum(np.size(s.x) for s in panel.series if s.mark == "up")
         beyond += cut
     assert beyond > 0
+
+
+def test_one_matched_spike_has_no_rate_and_no_empty_panel_of_it(as_believed):
+    twin = find(as_believed).beside.twin
+    spikes = twin.spikes
+    open_ = {name: each[:1] for name, each in spikes.open.items()}
+    none = dict.fromkeys(("rate_error", "rated", "rate_tolerance"), np.empty(0))
+    first = {"measured": spikes.measured[:1], "offsets": spikes.offsets[:1]}
+    one = replace(spikes, **first, **none, open=open_, missed=1)
+    plot = twin_plot(as_believed, replace(twin, spikes=one))
+    assert [panel.label for panel in plot.panels] == ["V_C1", "Spikes"]
+    assert "Rate" not in plot.caption
+    assert "1 predicted one missing" in one.sentence
+
+
+def test_a_tolerance_of_v_c2_is_no_more_than_it_swings(as_believed):
+    """Displaced spikes made tens of volts of it."""
+    beside = find(as_believed).beside
+    node_b = beside.twin.residual("V_C2")
+    wild = replace(node_b, open={"force": np.full(node_b.time.size, 30.0)})
+    twin = replace(beside.twin, residuals=(wild,))
+    said = " ".join(sentences(replace(beside, twin=twin), as_believed))
+    assert "tolerance, 3200 mV (median; 95 % below 3200 mV)" in said
 
 
 def test_the_bias_of_the_follower_is_identified(as_believed):
