@@ -95,15 +95,16 @@ def describe(path: Path) -> dict[str, Any]:
                 for name in run.signals
                 for signal in [run.signal(name)]
             }
-            summary["spikes"] = int(run.spikes.size)
-            trials = run.trials
+            searched, trials = run.detection is not None, run.trials
+            if searched:
+                summary["spikes"] = int(run.spikes.size)
             summary["trials"] = [
                 {
                     "label": row["label"].decode(),
                     "level_N": None if row["level"] != row["level"] else row["level"],
                     "start_s": float(row["start"]),
                     "end_s": float(row["end"]),
-                    "spikes": int(row["spikes"]),
+                    "spikes": int(row["spikes"]) if searched else None,
                     "complete": whole,
                 }
                 for row, whole in zip(trials, ended(trials), strict=True)
@@ -140,8 +141,9 @@ def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
         rate = show(signal["sample_rate_Hz"], "S/s")
         step = show(signal["resolution"], signal["unit"], 3)
         yield name, f"{signal['samples']} samples, {rate}, step {step}"
-    if summary["spikes"] is not None:
-        yield "spikes", str(summary["spikes"])
+    if summary["duration_s"] is not None:
+        spikes = summary["spikes"]
+        yield "spikes", "not looked for" if spikes is None else str(spikes)
     for trial in summary["trials"]:
         begun = f"{trial['start_s']:.3f}"
         if trial["start_s"] < trial["end_s"]:
@@ -149,8 +151,9 @@ def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
         else:  # prepared, and the run ended before it
             times = f"would have begun at {begun} s"
         cut = "" if trial["complete"] else ", cut short"
-        told = count(trial["spikes"], "spike")
-        yield "trial", f"{trial['label']:<12} {times}, {told}{cut}"
+        spikes = trial["spikes"]
+        told = "" if spikes is None else f", {count(spikes, 'spike')}"
+        yield "trial", f"{trial['label']:<12} {times}{told}{cut}"
     if summary["overrange_blocks"]:
         yield "over range", f"in {summary['overrange_blocks']} blocks"
     if summary["loss"]:

@@ -15,8 +15,10 @@ import h5py
 import numpy as np
 import pytest
 
+from tactile_lab.commands.show import describe, rows
 from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.store.certificate import write_certificate
+from tactile_lab.store.export.ro_crate import crate
 from tactile_lab.store.recover import recover
 from tactile_lab.store.run import Run
 from tactile_lab.store.verify import verify
@@ -293,6 +295,11 @@ def test_spikes_cannot_be_checked_where_v_k_is_not_stored(
     certificate = write_certificate(folder.path)
     assert certificate.spikes is None
     assert told in str(certificate)
+    shown = [f"{name} {value}" for name, value in rows(describe(folder.path))]
+    assert ("spikes not looked for" in shown) is not searched
+    with Run.load(folder.path) as run:
+        described = json.dumps(crate(run))
+    assert ("spikes not looked for" in described) is not searched
 
 
 def test_samples_the_scope_made_but_nobody_stored_are_counted(bench, recorder, folder):

@@ -119,13 +119,15 @@ def crate(run: Run) -> dict[str, Any]:
         "name": "Tactile Lab",
         "version": str((info.get("environment") or {}).get("tactile-lab", "")),
     }
+    spikes = "spikes not looked for"
+    if run.detection is not None:
+        spikes = count(len(run.table("spikes")), "spike")
     dataset: Entity = {
         "@id": "./",
         "@type": "Dataset",
         "name": f"{title}: {run.path.resolve().name}",
         "description": f"{title} on a spiking piezoelectric tactile sensor, {kind} "
-        f"({info.get('bench')}), {run.status}; {run.duration:.4g} s, "
-        f"{count(len(run.table('spikes')), 'spike')}",
+        f"({info.get('bench')}), {run.status}; {run.duration:.4g} s, {spikes}",
         "datePublished": info.get("started"),
         "keywords": ["tactile sensor", "spikes", kind],
         "hasPart": [{"@id": one["@id"]} for one in files],
