@@ -115,6 +115,7 @@ from tactile_lab.model.taylor import Y as OF_V_C1
 from tactile_lab.model.transistor import (
     A_BY_1,
     C2_BY_2,
+    FLOW,
     TO_A,
     TO_C2,
     reach,
@@ -169,9 +170,9 @@ def _build(stamp: int) -> Callable[..., Any]:
         piece_rows = np.empty((16, PIECE_ROW))
         spikes = np.empty(64)
         W = np.empty(2 * ORDER)
-        f = np.empty(6)
-        g = np.empty(6)
-        m = np.empty(6)
+        f = np.empty(FLOW)
+        g = np.empty(FLOW)
+        m = np.empty(FLOW)
         matrix = np.empty((2 * ORDER, 2 * ORDER))
         right = np.empty((2 * ORDER, COLUMNS))
         a = np.empty(ORDER + 1)
@@ -216,6 +217,7 @@ def _build(stamp: int) -> Callable[..., Any]:
             moving |= abs(f[TO_C2]) > -1e-14 * f[C2_BY_2] * high
             stiff = V1 == V0 and not moving
             h = T
+            known = False
             tries = short = 0
             while s < T:
                 held = S[RESUME] >= 0.0
@@ -225,14 +227,16 @@ def _build(stamp: int) -> Callable[..., Any]:
                     status = STUCK
                     break
                 wanted = max(SHARE * tolerance, 6e-16 * max(abs(y), abs(v)))
-                flow(B_at(V_P_at(s, V0, p, par[TAU]), par), y, v, held, par, f)
+                if not known:
+                    flow(B_at(V_P_at(s, V0, p, par[TAU]), par), y, v, held, par, f)
+                known = True
                 rate = fastest(f)
                 unit = 1.0 / rate
                 degree = 0
                 stiff = stiff or short >= PATIENCE
                 if not stiff:
                     degree = expanded(
-                        s, room, y, v, held, V0, p, rate, wanted, par, g, c, step
+                        s, room, y, v, held, V0, p, rate, wanted, par, f, g, c, step
                     )
                     S[ITERATIONS] += 1.0
                     h = step[LENGTH]
@@ -281,7 +285,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     else:
                         end_inside(u, y, v, W, right, step)
                 if degree:
-                    move(s, x, unit, held, V0, p, degree, par, c, f, m, g, step)
+                    move(x, unit, held, degree, par, c, f, m, g, step)
                 S[STEPS] += 1.0
                 S[EXPANSIONS] += 1.0
                 S[Y_LARGEST_ERROR] = max(
@@ -338,6 +342,10 @@ def _build(stamp: int) -> Callable[..., Any]:
                 s = following
                 if held:
                     S[RESUME] -= h
+                # a series ends where `flow` was asked for, and the next one begins
+                known = degree > 0 and u > 1.0
+                if known:
+                    f, g = g, f
                 if u <= 1.0:
                     B = B_at(V_P_at(s, V0, p, par[TAU]), par)
                     flow(B, y, v, False, par, f)
@@ -381,7 +389,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     v = restart(
                         B_at(V_P_at(s, V0, p, par[TAU]), par), y, par, E, S, f, g
                     )
-                    short, stiff = 0, False
+                    known, short, stiff = False, 0, False
             S[Y], S[VOLTAGE] = y, v
             if status != DONE:
                 break

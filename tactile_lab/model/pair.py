@@ -9,7 +9,7 @@ import numpy as np
 from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import TAU_L, V_RESET, series_at, to_series
-from tactile_lab.model.node_a import LAMBDA, TAU, V_T, B_at, V_P_at, slope_at
+from tactile_lab.model.node_a import DIVIDER, LAMBDA, TAU, V_T, B_at, V_P_at
 from tactile_lab.model.tableau import (
     DIFFERENTIATE,
     NODES,
@@ -23,6 +23,8 @@ from tactile_lab.model.transistor import (
     A_BY_2,
     C2_BY_1,
     C2_BY_2,
+    OF_B,
+    OF_Q,
     TO_A,
     TO_C2,
     currents,
@@ -43,6 +45,22 @@ STEP = 13
 
 
 @inner
+def with_node_a(
+    B: float, Q: float, q: float, y: float, v: float, held: bool, par: FloatArray,
+    f: FloatArray,
+) -> None:  # fmt: skip
+    """Add to T1's currents in `f` what Eqs. (16) and (18) have; Q is q - 1."""
+    f[OF_B], f[OF_Q] = B, Q
+    f[TO_A] += par[LAMBDA] * (par[DIVIDER] - y) + B * Q
+    f[A_BY_1] -= par[LAMBDA] + B * q / par[V_T]
+    if held:
+        f[TO_C2] = f[A_BY_2] = f[C2_BY_1] = f[C2_BY_2] = 0.0
+    else:
+        f[TO_C2] -= v / par[TAU_L]
+        f[C2_BY_2] -= 1.0 / par[TAU_L]
+
+
+@inner
 def flow(
     B: float, y: float, v: float, held: bool, par: FloatArray, f: FloatArray
 ) -> None:
@@ -51,14 +69,14 @@ def flow(
     While the firing stage conducts (`held`), it keeps T1's collector at V_reset.
     """
     currents(y, par[V_RESET] if held else v, par, f)
-    q = math.exp(-y / par[V_T])
-    f[TO_A] += slope_at(B, y, par)
-    f[A_BY_1] -= par[LAMBDA] + B * q / par[V_T]
-    if held:
-        f[TO_C2] = f[A_BY_2] = f[C2_BY_1] = f[C2_BY_2] = 0.0
+    x = -y / par[V_T]
+    if x < -1.0:
+        q = math.exp(x)
+        Q = q - 1.0
     else:
-        f[TO_C2] -= v / par[TAU_L]
-        f[C2_BY_2] -= 1.0 / par[TAU_L]
+        Q = math.expm1(x)
+        q = 1.0 + Q
+    with_node_a(B, Q, q, y, v, held, par, f)
 
 
 @inner

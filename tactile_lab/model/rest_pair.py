@@ -13,6 +13,7 @@ from tactile_lab.model.integrator import TAU_L, V_S, Q_at
 from tactile_lab.model.node_a import LAMBDA, V_T, B_at, equilibrium
 from tactile_lab.model.pair import flow
 from tactile_lab.model.transistor import (
+    FLOW,
     I_S1,
     SATURATES,
     T1_BIAS,
@@ -58,7 +59,7 @@ def _build(stamp: int) -> Callable[..., Any]:
         _ = stamp
         if par[SATURATES] == 0.0:
             return rest_of_cascade(par)
-        f = np.empty(6)
+        f = np.empty(FLOW)
         B = B_at(0.0, par)
         highest = par[V_S] + par[T1_BIAS] / (par[LAMBDA] * par[T1_C1])
         low, high = -par[V_T], max(highest, par[V_S]) + par[V_T]

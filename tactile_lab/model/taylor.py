@@ -13,7 +13,7 @@ import math
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
-from tactile_lab.model.integrator import DIRECT, TAU_L, V_RESET, V_S, omega, to_series
+from tactile_lab.model.integrator import DIRECT, TAU_L, to_series
 from tactile_lab.model.node_a import DIVIDER, LAMBDA, PER_VOLT, TAU, V_T, B_at, V_P_at
 from tactile_lab.model.pair import (
     GROWTH,
@@ -27,6 +27,7 @@ from tactile_lab.model.pair import (
     V_END,
     Y_END,
     flow,
+    with_node_a,
 )
 from tactile_lab.model.tableau import ORDER, POINTS
 from tactile_lab.model.transistor import (
@@ -34,9 +35,11 @@ from tactile_lab.model.transistor import (
     A_BY_2,
     C2_BY_1,
     C2_BY_2,
-    E_DROP,
-    E_LOG,
     I_S1,
+    OF_B,
+    OF_Q,
+    OF_W,
+    OF_X,
     PER_F,
     PER_R,
     R_E,
@@ -45,6 +48,7 @@ from tactile_lab.model.transistor import (
     T1_C2,
     TO_A,
     TO_C2,
+    of_junctions,
 )
 
 LEAST, MOST = 10, 30
@@ -101,9 +105,8 @@ def fastest(f: FloatArray) -> float:
 def expand_B(
     V_P: float, p: float, unit: float, degree: int, par: FloatArray, c: FloatArray
 ) -> int:
-    """Fill the rows G and B; returns the last coefficient of B that is not nothing."""
+    """Fill the rows G and B from B's first; returns the last that is not nothing."""
     c[G, 0] = unit * (p - V_P / par[TAU])
-    c[B, 0] = B_at(V_P, par)
     least = 1e-20 * c[B, 0]
     for k in range(degree):
         c[B, k + 1] = par[PER_VOLT] * product(c, G, B, k) / (k + 1)
@@ -118,9 +121,10 @@ def expand_B(
 @inner
 def expand(
     s: float, y: float, v: float, held: bool, V0: float, p: float, unit: float,
-    degree: int, par: FloatArray, c: FloatArray,
+    degree: int, par: FloatArray, f: FloatArray, c: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill the rows of `c` at s after the segment's start, up to `degree`."""
+    """Fill the rows of `c` at s after the segment's start, where `flow` is f."""
+    c[B, 0], c[Q, 0], c[X, 0], c[W, 0] = f[OF_B], f[OF_Q], f[OF_X], f[OF_W]
     few = expand_B(V_P_at(s, V0, p, par[TAU]), p, unit, degree, par, c)
     v_t, leak, direct = par[V_T], par[I_S1], par[DIRECT] != 0.0
     to_a, to_c2 = unit / par[T1_C1], unit / par[T1_C2]
@@ -128,15 +132,9 @@ def expand(
     r = 1.0 + par[PER_R]
     per_w = 1.0 if direct else v_t / ((1.0 + par[PER_F]) * par[R_E])
     c[Y, 0], c[V, 0] = y, v
-    c[Q, 0] = math.expm1(-y * per_t)
-    c[X, 0] = math.expm1(((par[V_RESET] if held else v) - y) * per_t)
     open_1, open_2 = 1.0 + c[Q, 0] > NOTHING, 1.0 + c[X, 0] > NOTHING
     per_u = 0.0
-    if direct:
-        c[W, 0] = leak * math.exp((par[V_S] - y) * per_t)
-    else:
-        z = (par[V_S] - y + par[R_E] * leak * c[X, 0] + par[E_DROP]) * per_t
-        c[W, 0] = omega(z + par[E_LOG])
+    if not direct:
         per_u = 1.0 / (1.0 + c[W, 0])
         c[U, 0] = c[W, 0] * per_u
     leak_1, to_z = unit * par[LAMBDA], par[R_E] * leak * per_t
@@ -249,7 +247,8 @@ def moved(
     if root < 1e-3:
         even, odd = 1.0 + 0.5 * square, 1.0 + square / 6.0
     elif square > 0.0:
-        even, odd = math.cosh(root), math.sinh(root) / root
+        up = math.exp(root)
+        even, odd = 0.5 * (up + 1.0 / up), 0.5 * (up - 1.0 / up) / root
     else:
         even, odd = math.cos(root), math.sin(root) / root
     scale = math.exp(mean)
@@ -270,31 +269,36 @@ def end_at(
 
 @inner
 def move(
-    s: float, x: float, unit: float, held: bool, V0: float, p: float, degree: int,
-    par: FloatArray, c: FloatArray, f: FloatArray, m: FloatArray, g: FloatArray,
-    step: FloatArray,
+    x: float, unit: float, held: bool, degree: int, par: FloatArray, c: FloatArray,
+    f: FloatArray, m: FloatArray, g: FloatArray, step: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill what a volt at the start moves after x units; f and g are `flow` there."""
+    """Fill what a volt at the start moves after x units; f and g are `flow` there.
+
+    In the middle the series tell it.
+    """
+    junction_2, junction_1 = two_at(c, X, W, degree, 0.5 * x)
+    B_m, Q_m = two_at(c, B, Q, degree, 0.5 * x)
     y, v = two_at(c, Y, V, degree, 0.5 * x)
-    B_m = B_at(V_P_at(s + 0.5 * x * unit, V0, p, par[TAU]), par)
-    flow(B_m, y, v, held, par, m)
+    of_junctions(junction_2, junction_1, par, m)
+    with_node_a(B_m, Q_m, 1.0 + Q_m, y, v, held, par, m)
     moved(x * unit, f, m, g, step)
 
 
 @inner
 def expanded(
     s: float, room: float, y: float, v: float, held: bool, V0: float, p: float,
-    rate: float, wanted: float, par: FloatArray, g: FloatArray, c: FloatArray,
-    step: FloatArray,
+    rate: float, wanted: float, par: FloatArray, f: FloatArray, g: FloatArray,
+    c: FloatArray, step: FloatArray,
 ) -> int:  # fmt: skip
-    """A step from s of at most `room` s that misses `wanted` V; returns its degree.
+    """A step from s, where `flow` is f, that misses `wanted` V; returns its degree.
 
     Its error is told by how far the series' slope at the end is from the equations'
-    there, which are left in `g`. Returns 0 where none is short enough.
+    there, which are left in `g`. It takes `room` s at most. Returns 0 where none is
+    short enough.
     """
     degree = degree_for(wanted)
     unit = 1.0 / rate
-    expand(s, y, v, held, V0, p, unit, degree, par, c)
+    expand(s, y, v, held, V0, p, unit, degree, par, f, c)
     x = reached(c, degree, wanted)
     step[LENGTH] = (x if x > 0.1 else 0.1) * unit
     x = min(x, longest(degree), room * rate)

@@ -26,26 +26,30 @@ I_S1, R_E, PER_F, PER_R, T1_C1, T1_C2, T1_BIAS, E_DROP, E_LOG, SATURATES = range
 ln(a R3 I_T1s/V_T) with a = 1 + 1/beta_F, and whether T1 saturates at all."""
 ALL_PARAMETERS = PARAMETERS + 10
 EXPONENT_CAP = 230.0
-TO_A, TO_C2, A_BY_1, A_BY_2, C2_BY_1, C2_BY_2 = range(6)
+TO_A, TO_C2, A_BY_1, A_BY_2, C2_BY_1, C2_BY_2, OF_B, OF_Q, OF_X, OF_W = range(10)
+"""Where `pair.flow` puts both slopes, V/s, their derivatives by either voltage, 1/s,
+and what they are made of: B, exp(-V_C1/V_T) - 1, J/I_T1s and omega or, with "direct",
+I_F + I_T1s."""
+FLOW = 10
+"""Numbers of a flow."""
 
 
 @inner
-def currents(y: float, v: float, par: FloatArray, out: FloatArray) -> None:
-    """Fill `out` at V_C1 = y, V_C2 = v.
+def of_junctions(X: float, W: float, par: FloatArray, out: FloatArray) -> None:
+    """Fill `out` from the collector junction's state X and the emitter junction's W.
 
-    I_B/C1 and (I_C + I_bias)/C2, V/s, then their derivatives by y and v, 1/s.
+    I_B/C1 and (I_C + I_bias)/C2, V/s, then their derivatives by V_C1 and V_C2, 1/s.
     """
-    J = par[I_S1] * math.expm1(min((v - y) / par[V_T], EXPONENT_CAP))
+    out[OF_X], out[OF_W] = X, W
+    J = par[I_S1] * X
     J_v = (J + par[I_S1]) / par[V_T]
-    U = par[V_S] - y
     a = 1.0 + par[PER_F]
     if par[DIRECT] != 0.0:
-        I_F = par[I_S1] * math.expm1(min(U / par[V_T], 600.0))
-        F_y, F_v = -(I_F + par[I_S1]) / par[V_T], 0.0
+        I_F = W - par[I_S1]
+        F_y, F_v = -W / par[V_T], 0.0
     else:
-        w = omega((U + par[R_E] * J + par[E_DROP]) / par[V_T] + par[E_LOG])
-        I_F = par[V_T] / (a * par[R_E]) * w - par[I_S1]
-        g = w / (1.0 + w) / (a * par[R_E])
+        I_F = par[V_T] / (a * par[R_E]) * W - par[I_S1]
+        g = W / (1.0 + W) / (a * par[R_E])
         F_v = g * par[R_E] * J_v
         F_y = -g - F_v
     r = 1.0 + par[PER_R]
@@ -55,6 +59,19 @@ def currents(y: float, v: float, par: FloatArray, out: FloatArray) -> None:
     out[A_BY_2] = (F_v * par[PER_F] + J_v * par[PER_R]) / par[T1_C1]
     out[C2_BY_1] = (F_y + J_v * r) / par[T1_C2]
     out[C2_BY_2] = (F_v - J_v * r) / par[T1_C2]
+
+
+@inner
+def currents(y: float, v: float, par: FloatArray, out: FloatArray) -> None:
+    """Fill `out` at V_C1 = y, V_C2 = v with the junctions' state and `of_junctions`."""
+    X = math.expm1(min((v - y) / par[V_T], EXPONENT_CAP))
+    U = par[V_S] - y
+    if par[DIRECT] != 0.0:
+        W = par[I_S1] * math.exp(min(U / par[V_T], 600.0))
+    else:
+        J = par[I_S1] * X
+        W = omega((U + par[R_E] * J + par[E_DROP]) / par[V_T] + par[E_LOG])
+    of_junctions(X, W, par, out)
 
 
 @inner

@@ -23,7 +23,7 @@ from tactile_lab.model.node_a import TAU, B_at, V_P_at, slope_at
 from tactile_lab.model.packed import parameters
 from tactile_lab.model.pair import flow
 from tactile_lab.model.state import Start
-from tactile_lab.model.transistor import SATURATES, TO_A, TO_C2
+from tactile_lab.model.transistor import FLOW, SATURATES, TO_A, TO_C2
 from tactile_lab.waveform import Waveform
 
 
@@ -167,7 +167,7 @@ def slopes(
     both: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Eqs. (7), (8) and (16) to (18), V/s; `both` holds six numbers of room."""
+    """Eqs. (7), (8) and (16) to (18), V/s; `both` has room for a `flow`."""
     B = B_at(V_P_at(s, V0, p, par[TAU]), par)
     if par[SATURATES] != 0.0:
         flow(B, y, v, held, par, both)
@@ -206,7 +206,7 @@ def march(problem: Problem, piece: Piece, cap: float, most: int = 2_000_000) -> 
     """
     c, par = problem.circuit, problem.par
     deadline = Deadline(cap)
-    y, both = np.array(problem.first), np.empty(6)
+    y, both = np.array(problem.first), np.empty(FLOW)
     spikes: list[float] = []
     resume, evaluations = -1.0, 0
     for t0, t1, V0, p in problem.segments:

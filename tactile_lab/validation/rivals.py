@@ -20,7 +20,7 @@ from tactile_lab.model.integrator import T_EPS, TAU_L, V_FIRE, V_RESET, Q_at, Q_
 from tactile_lab.model.node_a import LAMBDA, PER_VOLT, TAU, V_T, B_at, V_P_at, slope_at
 from tactile_lab.model.pair import flow
 from tactile_lab.model.spiking import grown
-from tactile_lab.model.transistor import SATURATES
+from tactile_lab.model.transistor import FLOW, SATURATES
 from tactile_lab.validation.problem import Answer, OutOfTimeError, Problem, slopes
 from tactile_lab.validation.tableaux import (
     DP_A,
@@ -62,7 +62,7 @@ def jacobian(
             J[1] = (Q - v) / par[TAU_L]
             J[4] = -Q_gain(Q, par) / par[TAU_L]
             J[5] = -1.0 / par[TAU_L]
-    J[6] = B * par[PER_VOLT] * (p - V_P / par[TAU]) * math.expm1(-y / par[V_T])
+    J[FLOW] = B * par[PER_VOLT] * (p - V_P / par[TAU]) * math.expm1(-y / par[V_T])
 
 
 @inner
@@ -119,7 +119,7 @@ def step_rosenbrock(
             f[0], f[1] = J[0], J[1]
         else:
             slopes(s + RODAS_C[i] * h, z, w, V0, p, held, par, both, f)
-        one = f[0] + one / h + h * RODAS_D[i] * J[6]
+        one = f[0] + one / h + h * RODAS_D[i] * J[FLOW]
         two = f[1] + two / h
         k[i, 0] = (d * one - b * two) * reciprocal
         k[i, 1] = (a * two - c * one) * reciprocal
@@ -184,7 +184,7 @@ def _build_adaptive(stamp: int) -> Callable[..., Any]:
         spikes = np.empty(64)
         k = np.zeros((8, 2))
         dense = np.empty((5, 2))
-        error, both, J = np.empty(2), np.empty(7), np.empty(7)
+        error, both, J = np.empty(2), np.empty(FLOW), np.empty(FLOW + 1)
         resume = -1.0
         h = 1e-4
         for n in range(segments.shape[0]):
@@ -263,7 +263,7 @@ def _build_fixed(stamp: int) -> Callable[..., Any]:
         count = evaluations = 0
         spikes = np.empty(64)
         k = np.zeros((5, 2))
-        both = np.empty(7)
+        both = np.empty(FLOW)
         resume = -1.0
         for n in range(segments.shape[0]):
             t0, V0, p = segments[n, 0], segments[n, 2], segments[n, 3]
