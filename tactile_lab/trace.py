@@ -258,14 +258,14 @@ class Trace:
         if per <= 1 or self.empty:
             return self
         edges = np.arange(first or per, self.time.size, per)
-        edges = np.concatenate([np.zeros(1, np.intp), edges])
+        edges = np.concatenate([(0,), edges, (self.time.size,)])
         breaks = np.flatnonzero(self.gap)[1:]
         if self.width:
             missing = self.time[breaks] - self.time[breaks - 1] - self.width
             breaks = breaks[missing > (per - 0.5) * self.width]
         if breaks.size:
             edges = np.union1d(edges, breaks)
-        counts = np.diff(edges, append=self.time.size)
+        edges, counts = edges[:-1], np.diff(edges)
         return replace(
             self,
             time=self.time[edges],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,7 @@ class Drawing:
     tokens: Tokens
 
 
+@lru_cache(maxsize=64)
 def heights_of(
     low: float, high: float, height: float
 ) -> list[tuple[str, float, float]]:
@@ -386,10 +388,14 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
     def _dots(self, on: Drawing, measured: Trace, colour: str) -> None:
         """Mark rates, and samples where they lie apart: between them nobody looked."""
         frame = on.frame
-        inside = (measured.time >= frame.start) & (measured.time <= frame.end)
-        x, y = frame.x(measured.time[inside]), frame.y(measured.mean[inside])
+        first = np.searchsorted(measured.time, frame.start)
+        last = np.searchsorted(measured.time, frame.end, side="right")
+        if last - first > max(DOTS, (frame.right - frame.left) / APART + 1):
+            return  # they lie closer than is marked
+        shown = measured[first:last]
+        x, y = frame.x(shown.time), frame.y(shown.mean)
         rates = self.lane.key == "rate" and x.size <= DOTS
-        samples = bool(np.all((measured.low == measured.high)[inside]))
+        samples = np.array_equal(shown.low, shown.high)
         if rates or (samples and x.size > 1 and np.diff(x).min() >= APART):
             paint.dots(on.painter, x, y, colour)
 

@@ -50,6 +50,7 @@ class LiveSource(Source):
         self._gain = newtons_per_ampere
         self._loop: list[tuple[float, float, float]] = []
         self._pyramids: dict[str, Pyramid] = {}
+        self._streamed = 0.0  # to where; asked 50 times a frame
         self._slow = {name: Readings() for name in ("force", *AVERAGED)}
         self._spikes = np.empty(1024)
         self._spike_count = 0
@@ -63,9 +64,9 @@ class LiveSource(Source):
     @property
     def reach(self) -> float:
         """Time up to which there is data, s."""
-        ends = [pyramid.end for pyramid in self._pyramids.values()]
-        slow = max(readings.end for readings in self._slow.values())
-        return max(ends) if ends else slow
+        if self._pyramids:
+            return self._streamed
+        return max(readings.end for readings in self._slow.values())
 
     @property
     def length(self) -> float:
@@ -108,7 +109,10 @@ class LiveSource(Source):
     def add_bins(self, bins: dict[str, Trace]) -> None:
         """The newest samples by signal."""
         for signal, part in bins.items():
-            self._pyramids.setdefault(signal, Pyramid()).add(part)
+            pyramid = self._pyramids.get(signal) or Pyramid()
+            pyramid.add(part)
+            self._pyramids[signal] = pyramid
+            self._streamed = max(self._streamed, pyramid.end)
 
     def add_spikes(self, times: tuple[float, ...]) -> None:
         """Detected spikes, ascending."""
