@@ -340,7 +340,8 @@ def lies(reports: list[dict]) -> list[str]:
 
 def drive(seed: int, seconds: float) -> tuple[str, bool]:
     """One session; its row, and whether nothing was wrong."""
-    with tempfile.TemporaryDirectory() as folder:
+    # what the program started may still write as it ends
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         session = Session(seed, Path(folder))
         try:
             session.enter()
