@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from tactile_lab.analysis.noise import MAINS
 from tactile_lab.instruments.dialects import load_dialect
-from tactile_lab.instruments.registry import scope_capability
+from tactile_lab.instruments.registry import coil_capability, scope_capability
 from tactile_lab.magnetics import A2_PRINTED
 from tactile_lab.planning.computing import Computing
 from tactile_lab.planning.estimate import Cost, resolution
@@ -287,6 +287,7 @@ def assumptions(scene: Scene, needed: Needs) -> tuple[str, ...]:
             f"lags: coil {show(magnet.coil_lag, 's')}, core "
             f"{show(magnet.eddy_lag, 's')}, together{known}"
         )
+    lines += _clocks(scene, needed)
     if not bench.simulated:
         return tuple(lines)
     world = scene.simulated
@@ -324,6 +325,20 @@ def _followers(scene: Scene) -> Iterator[str]:
     )
 
 
+def _clocks(scene: Scene, needed: Needs) -> Iterator[str]:
+    """How well samples are dated against the force where no shunt shows its steps."""
+    source = scene.bench.coil
+    seen = {channel.signal for channel in needed.channels}
+    if source is None or not needed.coil or not seen or "coil_current" in seen:
+        return
+    yield (
+        "clocks: without coil_current in record.signals, spikes and voltages are dated "
+        f"against the force within {show(coil_capability(source).update_interval, 's')}"
+        ", an exchange with the source; with it within 0.5 ms, or as well as its edges "
+        "agree"
+    )
+
+
 def _band(half: float | None, unit: str) -> str:
     """An uncertainty behind its value."""
     return " (not stated how well)" if half is None else f" ±{show(half, unit)} (95 %)"
@@ -351,5 +366,7 @@ def _irregular(world: Simulated) -> Iterator[str]:
     if world.specimen:
         yield (
             f"specimen {world.specimen}: R within 1 %, C within 5 %, V_GS within 2 mV, "
-            "V_th within 5 mV (two standard deviations)"
+            "V_th within 5 mV (two standard deviations). What the run tells is of this "
+            "specimen alone, the model beside it is of the parts as marked: the spread "
+            "stands in no interval; a study over specimens tells it"
         )

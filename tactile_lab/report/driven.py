@@ -21,6 +21,14 @@ def told(run: Run) -> tuple[str, ...]:
     steps = len(applied.steps)
     if steps < 2:
         return ()
+    rows = run.current
+    by_list = "listed" in (rows.dtype.names or ()) and bool(rows["listed"].any())
+    if by_list and shunt is None:
+        return (
+            "coil current: as asked for while a list or the generator played, which "
+            "nothing measured: a source that gives another current shows in no number "
+            "here but through the sensor. Record coil_current to see it",
+        )
     said = (
         f"coil current: levels as the source read them back, {applied.edges} of "
         f"{steps - 1} steps timed by the shunt"

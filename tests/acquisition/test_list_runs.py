@@ -70,6 +70,18 @@ def test_a_list_that_does_not_play_ends_the_run_with_the_coil_off(run_scene, fau
     assert "did not start or was cut short" in ended.reason
 
 
+def test_a_list_whose_current_nothing_measures_is_said_to_be_as_asked_for(
+    ran, run_scene
+):
+    """Its report had "levels as the source read them back", where none was."""
+    from tactile_lab.report.driven import told
+
+    with run_scene(*LIST, 'record.signals=["V_C1"]').stored() as blind:
+        assert "as asked for" in told(blind)[0]
+        assert "which nothing measured" in told(blind)[0]
+    assert "timed by the shunt" in told(ran.stored())[0]
+
+
 def test_stop_in_the_middle_of_a_list_ramps_down(run_scene):
     def watch(execution, event):
         if isinstance(event, TrialStarted):

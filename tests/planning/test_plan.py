@@ -214,6 +214,14 @@ def test_a_threshold_outside_the_channel_is_refused():
         plan(load(None, ["detect.threshold=6 V"]))
 
 
+def test_it_says_how_well_samples_are_dated_where_no_shunt_shows_the_current():
+    """Nothing was said of it: they were dated to 46 ms, not to 0.5."""
+    seen = assumed('record.signals=["V_C1", "V_K", "spikes"]')
+    assert "dated against the force within 45" in seen
+    assert "clocks:" not in assumed()
+    assert "clocks:" not in assumed('record.signals=["force"]')
+
+
 def test_assumptions_are_stated():
     told = " ".join(plan(load(), preview=False).assumptions)
     for fact in (

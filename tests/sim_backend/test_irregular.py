@@ -106,6 +106,7 @@ def test_a_plan_tells_what_is_off_and_what_is_on():
     assert "noise of V_fire" not in dict(on.leaves_out)
     assert any("noise of the sensor: V_fire 20 mV" in line for line in on.assumptions)
     also = {
+        "simulated.specimen": 4,
         "simulated.warming": 3.0,
         "simulated.warming_time": 5.0,
         "simulated.hum": 0.03,
@@ -113,3 +114,4 @@ def test_a_plan_tells_what_is_off_and_what_is_on():
     said = "\n".join(plan(load("demo", also), preview=False).assumptions)
     assert "becomes 3 K warmer than at the begin, with a time constant of 5 s" in said
     assert "and 30 mV of mains hum on every channel" in said
+    assert "is of this specimen alone" in said, "no interval holds the spread"
