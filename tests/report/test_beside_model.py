@@ -91,7 +91,7 @@ def test_the_error_budget_tells_what_is_stated_and_what_is_not(as_believed):
         "unit", "whole", "numerics", "clocks", "follower", "lag", "force",
         "temperature", "noise",
     }  # fmt: skip
-    assert spikes["clocks"] == pytest.approx(5e-4, rel=1e-3)  # timed by the shunt
+    assert 1e-6 < spikes["clocks"] < 1e-4  # as well as edges that the shunt shows agree
     assert 1e-3 < spikes["follower"] < 2e-2
     assert spikes["force"] is None and spikes["temperature"] is None
     assert 1e-9 < spikes["numerics"] < 1e-5
