@@ -107,6 +107,7 @@ class ManualView(QWidget):
         """Show read-backs; allow what the state allows; `reading`: the meter is."""
         on = snapshot.manual
         idle = snapshot.state is WindowState.READY
+        taken = on and self.begin.hasFocus()
         self.begin.setVisible(not on)
         self.begin.setEnabled(idle and snapshot.coil is not None)
         reason = ""
@@ -120,6 +121,8 @@ class ManualView(QWidget):
         self.inputs.allow(idle and not on, reason)
         for widget in (self.current, self.slider, self.set, self.off):
             widget.setEnabled(on)
+        if taken:  # who took the coil by a key wants to set it
+            self.current.setFocus()
         if not on:
             self.current.setModified(False)
         self.check.setEnabled(idle and not on)

@@ -73,8 +73,10 @@ def test_a_tab_takes_the_keyboard(lab, window) -> None:
 def test_arrows_move_the_slider_of_the_coil(lab, window) -> None:
     window.review.show_tab(2)
     manual = window.review.manual
-    manual.begin.click()
+    manual.begin.setFocus()
+    press(lab, KEY.Key_Return)
     lab.until(lambda: lab.session.manual.opened and manual.slider.isEnabled())
+    assert lab.app.focusWidget() is manual.current, "not a button of the header"
     manual.slider.setFocus()
     for _ in range(3):
         press(lab, KEY.Key_Right)
