@@ -182,6 +182,7 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
             self.removeItem(box.axis)
             self.removeItem(box)
         self.boxes[:] = boxes
+        self._placed = [], QSize()  # a new one that is hidden moves none, and is seen
         for box in boxes:
             self.addItem(box)
             self.addItem(box.axis)

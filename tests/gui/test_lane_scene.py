@@ -195,6 +195,15 @@ def test_cursors_move_no_button_and_tell_their_times(app, stack, width):
     settle(app)
 
 
+def test_a_hidden_lane_that_comes_is_not_seen(app, stack):
+    """It stood in the corner of the lane of the force, over its axis."""
+    keys = [row.lane.key for row in stack.rows]
+    stack.show_lanes(lanes_for([*keys, "coil_current"], twin=False))
+    settle(app)
+    assert not box(stack, "coil_current").isVisible()
+    assert box(stack, "force").isVisible()
+
+
 def test_lanes_that_stay_keep_their_range_when_another_comes(app, stack):
     lane = box(stack, "V_C1")
     lane.zoom(2.0, lane.y() + 10)
