@@ -264,7 +264,7 @@ def clock_text(snapshot: Snapshot) -> tuple[str, str]:
             return word, elapsed
         return word, f"{elapsed} / {minutes(snapshot.expected)}"
     if snapshot.state is WindowState.FAULT:
-        return word, f"stopped at {elapsed}"
+        return word, "acknowledge to go on"  # it need not be of the last run
     if not snapshot.known:
         return word, "nobody answered lately"
     return word, f"last run {elapsed}" if snapshot.elapsed else "coil off"

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 
 from gui.look.theme import Theme
@@ -94,6 +96,8 @@ def test_durations() -> None:
 def test_clock_shows_elapsed_and_expected() -> None:
     running = Snapshot(state=WindowState.RUNNING, elapsed=23.4, expected=41.0)
     assert clock_text(running) == ("RUNNING", "00:23.4 / 00:41")
+    fault = replace(running, state=WindowState.FAULT)
+    assert "23.4" not in clock_text(fault)[1], "it may have come since that run"
 
 
 @pytest.mark.parametrize(
