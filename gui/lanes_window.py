@@ -17,6 +17,7 @@ from gui.header.stop import StopButton
 from gui.parts import Elided, bar, column, panel
 from gui.screen.panels import Panels
 from gui.tab_order import move_on
+from gui.within_reach import framed
 
 LEAST = 640, 420
 """Width and height, px: STOP and a few lanes."""
@@ -74,7 +75,7 @@ class LanesWindow(QWidget):
         here = self._window.screen()
         others = [one for one in QGuiApplication.screens() if one is not here]
         if others:
-            self.setGeometry(others[0].availableGeometry())
+            self.setGeometry(framed(others[0].availableGeometry(), self._window))
 
     def _name(self, title: str) -> None:
         self.setWindowTitle(f"Lanes · {title}")

@@ -73,5 +73,16 @@ def bring_back(window: QWidget, rooms: Sequence[QRect]) -> None:
     window.setWindowState(state)
 
 
+def framed(room: QRect, like: QWidget) -> QRect:
+    """What a window fills in all of a room with a frame as that of another window."""
+    whole, inner = like.frameGeometry(), like.geometry()
+    return room.adjusted(
+        inner.left() - whole.left(),
+        inner.top() - whole.top(),
+        inner.right() - whole.right(),
+        inner.bottom() - whole.bottom(),
+    )
+
+
 def _area(rectangle: QRect) -> int:
     return max(rectangle.width(), 0) * max(rectangle.height(), 0)

@@ -1,10 +1,12 @@
 """A screen that goes takes no window, and no STOP, along."""
 
+from types import SimpleNamespace
+
 import pytest
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QWidget
 
-from gui.within_reach import bring_back
+from gui.within_reach import bring_back, framed
 
 MAIN, SECOND = QRect(0, 0, 1366, 728), QRect(1366, 0, 1920, 1080)
 
@@ -38,6 +40,14 @@ def test_a_window_comes_back(window, place: QRect, rooms, then: QRect) -> None:
     window.setGeometry(place)
     bring_back(window, rooms)
     assert window.geometry() == then
+
+
+def test_a_window_that_fills_a_screen_has_its_title_bar_on_it() -> None:
+    inner = QRect(50, 60, 700, 500)
+    other = SimpleNamespace(
+        geometry=lambda: inner, frameGeometry=lambda: inner.adjusted(-1, -20, 2, 5)
+    )
+    assert framed(SECOND, other) == QRect(1367, 20, 1917, 1055)
 
 
 def test_the_windows_of_the_program_are_watched(lab) -> None:
