@@ -40,7 +40,7 @@ from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError
 
 LOW = 660
-"""Height of the panel, px, below which the queue shows one row instead of three."""
+"""Height of the panel, px, below which the queue shows less of fewer runs."""
 
 NAMED = 4
 """Changed parameters in the name of a run."""
@@ -172,7 +172,7 @@ class SetupPanel(QFrame):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Show as much of the queue as leaves room for the form."""
         super().resizeEvent(event)
-        self.queue.set_rows(3 if self.height() > LOW else 1)
+        self.queue.show_room(low=self.height() <= LOW)
 
     def edit(self, item: Queued) -> None:
         """Take up a waiting run's parameters into the form."""

@@ -23,8 +23,11 @@ from gui.setup.estimate import words_of
 from gui.state import minutes
 
 BUTTON = 30
-ROW = 59
-"""Height of a waiting run with the space below it, px."""
+ROW, LINE = 59, 39
+"""Height of a waiting run with the space below it, px: whole, and without its cost."""
+
+MOST, MOST_LOW = 3, 2
+"""Waiting runs that are seen without scrolling, in a high panel and in a low one."""
 
 
 class QueueCard(QFrame):
@@ -41,7 +44,6 @@ class QueueCard(QFrame):
         self.item, self.editing = item, editing
         number, count = place
         self.setProperty("role", "card-edited" if editing else "card")
-        self.setFixedHeight(ROW - 5)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         cost = "computing its plan …"
@@ -53,8 +55,7 @@ class QueueCard(QFrame):
         self.setAccessibleDescription("Enter edits it, Delete takes it out")
         self.setToolTip(f"{item.title}: {cost}\nClick or Enter edits it")
         self.buttons: dict[str, QWidget] = {}
-        whole = column(self, spacing=0)
-        whole.setContentsMargins(10, 2, 2, 5)
+        self._whole = column(self, spacing=0)
         top = row((Elided(item.title), 1), spacing=0)
         if editing:
             top.addWidget(label("editing", "pill"))
@@ -72,8 +73,15 @@ class QueueCard(QFrame):
                 top.addWidget(button)
             elif icon != "edit" and count > 1:  # they stay below each other
                 top.addSpacing(BUTTON)
-        whole.addLayout(top)
-        whole.addWidget(Elided(cost, "small"))
+        self._cost = Elided(cost, "small")
+        self._whole.addLayout(top)
+        self._whole.addWidget(self._cost)
+
+    def show_room(self, *, low: bool) -> None:
+        """Leave the cost to the tool tip where there is little room."""
+        self._cost.setVisible(not low)
+        self._whole.setContentsMargins(10, 2, 2, 2 if low else 5)
+        self.setFixedHeight((LINE if low else ROW) - 5)
 
     def _take_out(self) -> None:
         self.removed.emit(self.item)
@@ -105,7 +113,7 @@ class QueueView(QWidget):
         super().__init__()
         self._theme = theme
         self.cards: list[QueueCard] = []
-        self._most = 1
+        self._low = True
         self._sum = label("", "small")
         head = row(label("QUEUE", "section"), STRETCH, self._sum)
         tip = "Run one after the other (Ctrl+Shift+Return)"
@@ -151,17 +159,20 @@ class QueueView(QWidget):
         if focus is not None and self.cards:
             self._give_focus(*focus)
 
-    def set_rows(self, most: int) -> None:
-        """Show at most so many rows without scrolling."""
-        if most != self._most:
-            self._most = most
+    def show_room(self, *, low: bool) -> None:
+        """Show less of each run where there is little room."""
+        if low != self._low:
+            self._low = low
             self._fit()
             for card in self.cards:
                 if card.editing:
                     self._reveal(card)
 
     def _fit(self) -> None:
-        self._area.setFixedHeight(ROW * min(len(self.cards), self._most))
+        for card in self.cards:
+            card.show_room(low=self._low)
+        height, most = (LINE, MOST_LOW) if self._low else (ROW, MOST)
+        self._area.setFixedHeight(height * min(len(self.cards), most))
 
     def focus_on(self, item: Queued) -> None:
         """Give a waiting run the keyboard."""

@@ -1,11 +1,13 @@
 """The queue: what waits, what it costs, and what a STOP does to it."""
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
 
+from gui.look.theme import Theme
 from gui.parts import IconButton
 from gui.session.queue import Queued
+from gui.setup.queue import QueueView
 from gui.state import WindowState
 from tactile_lab.engine.request import Request
 from tactile_lab.scene.load import load
@@ -350,3 +352,21 @@ def test_force_beyond_the_coil_forbids_run_with_the_plans_words(lab) -> None:
     assert "reachable" in session.plan.problem
     assert not window.setup.run.isEnabled()
     window.setup.form.reset()
+
+
+def test_two_waiting_runs_are_seen_in_a_low_panel_and_three_in_a_high_one(app) -> None:
+    view = QueueView(Theme("light"))
+    view.resize(286, 300)
+    four = [Queued("Pulses", Request("demo"), None) for _ in range(4)]
+    view.show_queue(four, held=False)
+    view.show()
+    port = view._area.viewport()
+    for low, many in ((True, 2), (False, 3)):
+        view.show_room(low=low)
+        app.processEvents()
+        places = [QRect(c.mapTo(port, QPoint()), c.size()) for c in view.cards]
+        assert sum(port.rect().contains(place) for place in places) == many
+        for card in view.cards:
+            button = card.buttons["close"]
+            assert card.rect().contains(button.geometry()), "no button is cut"
+    view.close()
