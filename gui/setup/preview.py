@@ -14,6 +14,8 @@ from tactile_lab.trace import Trace
 
 HEIGHT = 118
 WAIT = "computing the plan …"
+FIRST = f"{WAIT}\n20 s longer the first time on a computer"
+"""Until a plan has come: the model's code may have to be compiled."""
 
 COLUMNS = 300
 """Columns of the plan that are drawn."""
@@ -27,14 +29,16 @@ class WaveformPreview(SmallPlot):
 
     def __init__(self, theme: Theme) -> None:
         self._head: float | None = None
-        super().__init__(theme, WAIT, HEIGHT)
+        self._wait = FIRST
+        super().__init__(theme, self._wait, HEIGHT)
         self.setProperty("role", "card")
         self.setAccessibleName("Force of the next run against time")
 
     def show_preview(self, preview: Preview | None, problem: str = "") -> None:
         """Show a plan, or why there is none."""
         planned = preview is not None and preview.length > 0
-        self.nothing = "" if problem or planned else WAIT
+        self._wait = WAIT if planned else self._wait
+        self.nothing = "" if problem or planned else self._wait
         self.setAccessibleDescription(problem)
         self.show_plot(_plan(preview) if preview is not None and planned else None)
 

@@ -13,12 +13,13 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 
 from gui.lanes.expected import Preview, Stretch
+from gui.look.theme import Theme
 from gui.parts import column, push, scrolling, with_gutter
 from gui.setup.fields import QuantityEdit
 from gui.setup.form import Form
 from gui.setup.parameter import FieldError, Kind, entry_of, listed, parameter, text_of
 from gui.setup.picker import Picker
-from gui.setup.preview import _plan
+from gui.setup.preview import FIRST, WAIT, WaveformPreview, _plan
 from gui.setup.subject import stated
 from tactile_lab.plugins import protocol_class, protocol_names, scene_names
 from tactile_lab.quantity import exact, parse
@@ -257,3 +258,16 @@ def test_a_decimal_comma_parts_no_values(text: str) -> None:
         entry_of(levels, text)
     told = entry_of(levels, "80.5 mN; 120.5 mN")
     assert told == entry_of(levels, "80.5, 120.5 mN") == '["80.5 mN", "120.5 mN"]'
+
+
+def test_the_first_plan_says_that_it_may_take_longer(app) -> None:
+    """It stood at "computing the plan …" for as long as the model was compiled."""
+    shown = WaveformPreview(Theme("light"))
+    force = Waveform.through([(0.0, 0.0), (1.0, 0.05), (4.0, 0.0)])
+    for preview, said in (
+        (None, FIRST),
+        (Preview(force, length=4.0), ""),
+        (None, WAIT),
+    ):
+        shown.show_preview(preview)
+        assert shown.nothing == said
