@@ -94,7 +94,7 @@ def test_rows_are_moved_and_taken_out_by_their_buttons(lab) -> None:
     assert [item.title for item in session.queue.items] == ["three", "one"]
     press("Take one out of the queue")
     lab.app.processEvents()
-    parts = window.setup.queue.cards[0].parts
+    parts = window.setup.queue.cards[0].buttons
     gap = parts["close"].x() - parts["edit"].geometry().right()
     assert gap < 10, "the pencil of a single run stood in the middle of its row"
     idle(lab)
