@@ -144,7 +144,9 @@ class ProgressStrip(QWidget):
     ) -> None:
         if snapshot.state is WindowState.ABORTING:
             self._left.setText("Stopping: the coil goes to 0 A and is read back")
-        elif trial is None:
+            self._right.setText(f"stopped at <b>{minutes(reach)}</b>")
+            return
+        if trial is None:
             self._left.setText("Opening instruments")
         else:
             total = f" of {len(holds)}" if holds else ""

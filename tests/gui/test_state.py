@@ -100,6 +100,15 @@ def test_clock_shows_elapsed_and_expected() -> None:
     assert "23.4" not in clock_text(fault)[1], "it may have come since that run"
 
 
+def test_a_run_that_is_stopped_has_no_time_left(app) -> None:
+    """It was done at a time that moved on, for as long as the source was silent."""
+    strip = ProgressStrip(Theme("light"))
+    snapshot = Snapshot(state=WindowState.ABORTING)
+    strip.show_run(snapshot, [], 22.0, 5.0, (0, "80 mN"), "")
+    assert "Stopping" in strip.text and "remaining" not in strip.text
+    assert "00:05" in strip.text
+
+
 @pytest.mark.parametrize(
     ("ending", "colour"),
     [("Complete", "green"), ("Aborted", "amber"), ("Faulted", "red"), ("", "accent")],
