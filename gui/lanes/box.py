@@ -192,11 +192,10 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         self._lock()
         self.setYRange(low + by, high + by, padding=0)
 
-    def show_between(self, bottom: float, top: float) -> None:
-        """Show the values between two heights in the scene, px."""
-        ends = self.value_at(bottom), self.value_at(top)
-        self._lock()
-        self.setYRange(*ends, padding=0)
+    def show_between(self, low: float, high: float, *, locked: bool = True) -> None:
+        """Show these values; unless `locked` until others come into view."""
+        self.locked = locked
+        self.setYRange(low, high, padding=0)
 
     def boundingRect(self) -> QRectF:
         """The plot with its axis and its tag."""

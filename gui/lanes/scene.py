@@ -321,11 +321,14 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
         if pressed is None:
             super().mouseReleaseEvent(event)
         elif box is not None and box.width() > 4:
-            lane = self.lane_at(pressed.y())
-            if lane is not None and box.height() < self.stage.whole().bottom:
-                lane.show_between(box.bottom(), box.top())
+            lane, whole = self.lane_at(pressed.y()), self.stage.whole().bottom
             a, b = self.time_at(box.left()), self.time_at(box.right())
-            self.box_zoomed.emit(a, b)
+            if lane is None or box.height() >= whole:
+                self.box_zoomed.emit(a, b)
+            else:
+                low, high = lane.value_at(box.bottom()), lane.value_at(box.top())
+                self.box_zoomed.emit(a, b)  # which notes the range of before
+                lane.show_between(low, high)
         self.refresh()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -59,6 +59,7 @@ class LaneStack(QFrame):
         lanes = row(self._cards, spacing=0)
         lanes.addWidget(self.scene, 1)
         self._whole = column(self, (lanes, 1), self.navigator, spacing=0)
+        view.beside = self._ranges
         view.changed.connect(self.refresh)
         view.cursors_changed.connect(self.show_values)
         self.scene.drawn.connect(self._follow_picture)
@@ -118,6 +119,18 @@ class LaneStack(QFrame):
         self.refresh()
         self.show_values()
         self.source_changed.emit()
+
+    def _ranges(self) -> Callable[[], None]:
+        """Note the lanes' ranges; the answer shows them again."""
+        kept = {one.lane.key: (*one.box.shown, one.box.locked) for one in self.rows}
+
+        def show() -> None:
+            for one in self.rows:
+                if one.lane.key in kept:
+                    low, high, locked = kept[one.lane.key]
+                    one.box.show_between(low, high, locked=locked)
+
+        return show
 
     def hide_lane(self, key: str, hidden: bool) -> None:
         """Hide or show one lane."""

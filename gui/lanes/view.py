@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Signal
 
 HEAD = 0.9
 """Where "now" stays while following, as a share of the width."""
+
+Seen = tuple[float, float, Callable[[], object]]
+"""Start and width of a view, s, and what shows the rest of it."""
 
 PAUSE, KEPT = 0.6, 50
 """Seconds without a change after which a view is kept for the way back; how many."""
@@ -33,8 +36,10 @@ class TimeView(QObject):
         self.follow = True
         self.cursors: tuple[float, float] | None = None
         self.spike: float | None = None
-        self._before: list[tuple[float, float]] = []
-        self._after: list[tuple[float, float]] = []
+        self.beside: Callable[[], Callable[[], object]] = lambda: lambda: None
+        """Notes what else is seen, such as ranges of values; its answer shows that."""
+        self._before: list[Seen] = []
+        self._after: list[Seen] = []
         self._noted = -PAUSE
         self.clock = time.monotonic
 
@@ -73,7 +78,7 @@ class TimeView(QObject):
         """Keep where we are for the way back; one drag or turn of the wheel is one."""
         now = self.clock()
         if now - self._noted > PAUSE:
-            self._before = [*self._before[-KEPT:], (self.start, self.width)]
+            self._before = [*self._before[-KEPT:], self._seen]
             self._after = []
         self._noted = now
 
@@ -89,11 +94,17 @@ class TimeView(QObject):
         """Undo going back."""
         self._return(self._after, self._before)
 
-    def _return(self, here: list[tuple[float, float]], there: list[Any]) -> None:
+    @property
+    def _seen(self) -> Seen:
+        return self.start, self.width, self.beside()
+
+    def _return(self, here: list[Seen], there: list[Seen]) -> None:
         if here:
-            there.append((self.start, self.width))
+            there.append(self._seen)
             kept = self._before, self._after
-            self.show_span(*here.pop())
+            start, width, show_beside = here.pop()
+            show_beside()
+            self.show_span(start, width)
             self._before, self._after = kept
             self._noted = -PAUSE
 

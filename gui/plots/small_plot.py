@@ -515,7 +515,7 @@ def _pieces(x: FloatArray, y: FloatArray) -> Iterator[slice]:
 
 
 def _rich(text: str, colour: str = "") -> str:
-    """Text with V_C1 as a symbol with its subscript, as HTML."""
+    """Text with V_C1 as a symbol with its subscript, and ohms as Ω, as HTML."""
     named = re.sub(r"\b([A-Z])_([A-Z0-9]+)\b", r"\1<sub>\2</sub>", html.escape(text))
-    named = named.replace("\n", "<br>")
+    named = re.sub(r"Ohm\b", "Ω", named.replace("\n", "<br>"))
     return f'<span style="color:{colour}">{named}</span>' if colour else named

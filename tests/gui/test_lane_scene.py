@@ -157,6 +157,12 @@ def test_a_zoom_box_zooms_time_and_values_and_shows_the_data_in_it(app, stack):
         stack.view.end, times[1]
     )
     assert np.isclose(span(lane), before * 30 / place.height())
+    stack.view.back()
+    settle(app)
+    assert np.isclose(span(lane), before) and not lane.locked, "values go back, too"
+    stack.view.forward()
+    settle(app)
+    assert np.isclose(span(lane), before * 30 / place.height()) and lane.locked
     assert len(inside) > 1, "the box covers what is in it"
 
 

@@ -234,5 +234,6 @@ def test_a_map_of_one_value_makes_up_no_scale(app, z, told):
     cells = Series(name="count", x=[0.0, 1.0], y=[0.0, 0.0], z=z, mark="cells")
     view, panel = SmallPlot(Theme("light")), Panel(label="y", series=(cells,))
     view.show_plot(Plot(name="one", caption="", x_label="x", panels=(panel,)))
-    heading = re.sub(r"<[^>]*>", "", view.panels[0]._heading("y"))
+    heading = re.sub(r"<[^>]*>", "", view.panels[0]._heading("R (MOhm)"))
     assert heading.endswith(told), heading
+    assert heading.startswith("R (MΩ)"), "as the list of points has it"
