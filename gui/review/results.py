@@ -44,7 +44,7 @@ from gui.review.live_plots import (
     rate_plot,
     train_plot,
 )
-from gui.session.fit import Fit, FittedRate
+from gui.session.fit import SILENT, Fit, FittedRate
 from gui.session.steps import cells
 from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import Table
@@ -183,7 +183,7 @@ class ResultsView(QWidget):
 
     def _show_rates(self) -> None:
         self.plot.nothing = (
-            "No step has fired."
+            SILENT
             if self._levelled
             else "These steps are no levels of force: what they give\n"
             "is told by the report, at the end of the run."

@@ -32,6 +32,9 @@ COLUMNS = 2000
 RATES = 12
 """Newest steps whose law is drawn."""
 
+SILENT = "No step that ended has fired."
+"""Said also beside spikes of one that goes on, or that a fault ended."""
+
 FULL = 0.1
 """Relative error at which a bar is full."""
 
@@ -246,7 +249,7 @@ def _slope(steps: Sequence[MeasuredTrial]) -> tuple[str, str]:
 
 def _adaptation(steps: Sequence[MeasuredTrial], model: Sequence[MeasuredTrial]) -> Card:
     """Of the newest step that lets it be told."""
-    name, why = "Adaptation 1/|β|", "No step has fired."
+    name, why = "Adaptation 1/|β|", SILENT
     for at in range(len(steps) - 1, -1, -1):
         step = steps[at]
         if step.hold is None or not step.response.spikes:
@@ -254,7 +257,7 @@ def _adaptation(steps: Sequence[MeasuredTrial], model: Sequence[MeasuredTrial]) 
         try:
             found = fit_adaptation(step.spike_times, step.hold).time_constant
         except NotIdentifiableError as reason:
-            why = _capital(str(reason)) if why == "No step has fired." else why
+            why = _capital(str(reason)) if why == SILENT else why
             continue
         value, _, span = found.text("s").partition(" (")
         span = f"{span.removesuffix(', 95 %)')} {_where(step)}"
@@ -273,7 +276,7 @@ def _fall(steps: Sequence[MeasuredTrial], model: Sequence[MeasuredTrial]) -> Car
     """Of the largest force that fired."""
     fell = [at for at, step in enumerate(steps) if step.response.fall is not None]
     if not fell:
-        return Card("Fall in the hold", "—", "No step has fired often enough.")
+        return Card("Fall in the hold", "—", "No step that ended fired often enough.")
     at = max(fell, key=lambda number_: steps[number_].level or 0.0)
     text = _where(steps[at])
     theirs = model[at].response.fall if model else None

@@ -17,8 +17,8 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 import numpy as np
 from PIL import Image
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QImage
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QImage, QPixmap
 from PySide6.QtWidgets import QApplication
 
 from drivers.usb_presence import PICO, Present
@@ -33,6 +33,8 @@ SIZE = (1720, 1080)
 
 FILM, STEP, FORMAT = 1032, 0.25, QImage.Format.Format_RGB888
 """Width of a film, px; seconds between two of its frames; and how they are read."""
+LEVELS = 6
+"""Layouts within each other that a change of a text goes through."""
 
 
 class Port(NamedTuple):
@@ -110,8 +112,14 @@ class Stage:
             self.theme.choose(theme)
         self.live(0.15)
         file = self.folder / f"{name}.png"
-        self.window.grab().save(str(file))
+        self._grabbed().save(str(file), quality=0)  # as small as it gets
         print(file, flush=True)
+
+    def _grabbed(self) -> QPixmap:
+        """The window, once all in it has its place, as a screen paints it."""
+        for _ in range(LEVELS):
+            self.app.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
+        return self.window.grab()
 
     def film(self, name: str, ended: Callable[[], object]) -> None:
         """Save an animated picture of all until `ended()`, twice as fast as it was."""
@@ -119,7 +127,7 @@ class Stage:
         while not ended():
             self.live(STEP)
             times.append(time.monotonic())
-            image = self.window.grab().toImage().convertToFormat(FORMAT)
+            image = self._grabbed().toImage().convertToFormat(FORMAT)
             image = image.scaledToWidth(
                 FILM, Qt.TransformationMode.SmoothTransformation
             )

@@ -94,6 +94,11 @@ def _run(stage: Stage) -> None:
 def _after(stage: Stage) -> None:
     window = stage.window
     window.page.setFocus()
+    window.resize(1180, 720)
+    stage.live(0.2)
+    stage.shoot("window_small_dark", "dark")
+    window.resize(*SIZE)
+    stage.theme.choose("light")
     window.centre.view.show_all()
     window.centre.tools.widths.choose(3)
     window.centre.tools.toggle_cursors(True)
@@ -141,11 +146,6 @@ def _manual(stage: Stage) -> None:
 
 def _dialogs(stage: Stage) -> None:
     window = stage.window
-    window.resize(1180, 720)
-    stage.live(0.2)
-    stage.shoot("window_small_dark", "dark")
-    window.resize(*SIZE)
-    stage.theme.choose("light")
     window.actions_.show_help()
     stage.shoot("window_help")
     stage.close_overlays()
@@ -226,6 +226,11 @@ def _unplugged(stage: Stage) -> None:
     stage.window.setup.start()
     stage.until(lambda: stage.session.state is WindowState.FAULT)
     stage.live(0.3)
+    results, screen = stage.window.review.results, stage.window.screen_
+    stage.until(lambda: screen.run is not None and screen.run.has_model)
+    stage.until(lambda: results.mark.text().endswith("2 steps"))
+    stage.live(0.5)
+    stage.until(lambda: not results.cards.old)
     stage.shoot("window_fault_dark", "dark")
     stage.shoot("window_fault_light")
 
