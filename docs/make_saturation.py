@@ -273,7 +273,7 @@ Largest difference {worst["t1"]:.1%}.
 Largest difference {worst["complete"]:.1%} **where both fire**; the onset is wrong: T2
 draws a fraction of a nanoampere before it fires, which Eqs. (10) and (11) leave out, so
 that under held force ngspice's onset lies some 10 mN higher than ours and adaptation
-ends some five spikes earlier. Its peak voltage moves by 30 mV with the current, too.
+ends two to five spikes earlier. Its peak voltage moves by 30 mV with the current, too.
 
 {HEAD}
 {chr(10).join(lines["complete"])}
