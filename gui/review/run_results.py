@@ -118,12 +118,13 @@ class RunResults(QObject):
     def recorded(self, source: RunSource) -> None:
         """The record of the last run is there, which is on screen, or again.
 
-        Live, only what has come to its end is told: not a step that was cut short.
+        Its times are those of the report. Live, they are by the host's clock, and only
+        what has come to its end is told: not a step that was cut short.
         """
         if source.path != self.folder:
             self.stored(source)
-        elif len(of_run(source)) > len(self.steps):
-            self.steps = of_run(source)
+        elif len(found := of_run(source)) >= len(self.steps):
+            self.steps = found
             self._show(running=False)
             self._fit(source)
 

@@ -4,6 +4,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
+from gui.session.steps import of_run
 from gui.state import WindowState
 
 LEFT = Qt.MouseButton.LeftButton
@@ -64,6 +65,14 @@ def test_a_line_of_the_log_on_a_step_shows_it(lab) -> None:
     ]
     log.table.activated.emit(log.filter.mapFromSource(log.model.index(rows[-1], 3)))
     assert shows(view, steps[1])
+
+
+def test_a_run_that_ended_tells_the_times_of_its_record(lab) -> None:
+    """Live ones are by another clock: 290 ms stood where the report told 296 ms."""
+    folder, screen = lab.complete_run(), lab.window.screen_
+    lab.until(lambda: getattr(screen.run, "path", None) == folder)
+    told = [step.response.latency for step in screen.results.steps]
+    assert told == [step.response.latency for step in of_run(screen.run)]
 
 
 def test_a_step_that_stop_cut_short_has_its_results(lab) -> None:

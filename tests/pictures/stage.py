@@ -112,7 +112,8 @@ class Stage:
             self.theme.choose(theme)
         self.live(0.15)
         file = self.folder / f"{name}.png"
-        self._grabbed().save(str(file), quality=0)  # as small as it gets
+        seen = self._grabbed().toImage().convertToFormat(FORMAT)
+        _image(seen).quantize(256, dither=Image.Dither.NONE).save(file, optimize=True)
         print(file, flush=True)
 
     def _grabbed(self) -> QPixmap:
@@ -131,9 +132,7 @@ class Stage:
             image = image.scaledToWidth(
                 FILM, Qt.TransformationMode.SmoothTransformation
             )
-            size = image.width(), image.height()
-            rows = image.constBits(), "raw", "RGB", image.bytesPerLine()
-            frames.append(Image.frombytes("RGB", size, *rows))
+            frames.append(_image(image))
         file = self.folder / f"{name}.webp"
         frames[0].save(
             file, save_all=True, append_images=frames[1:], quality=60, method=4,
@@ -175,6 +174,12 @@ class Stage:
         """Close the window and end its engine."""
         self.window.close()
         self.session.close()
+
+
+def _image(seen: QImage) -> Image.Image:
+    """The same, in `FORMAT`, as Pillow has it."""
+    rows = seen.constBits(), "raw", "RGB", seen.bytesPerLine()
+    return Image.frombytes("RGB", (seen.width(), seen.height()), *rows)
 
 
 @contextmanager
