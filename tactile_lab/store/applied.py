@@ -33,6 +33,8 @@ BEFORE, AFTER = 0.06, 0.004
 """An edge is looked for so long before and after the host heard of the step, s."""
 BIN_TIME = 5e-4
 """Bins of the shunt that edges are looked for in, s."""
+BACK = 0.25
+"""Part of its step below which the shunt does not fall once an edge has come."""
 MOST_BINS = 1000
 """Bins read at once: of a longer stretch only the mean is asked for."""
 
@@ -184,6 +186,8 @@ def _edge(
     if not past.size or past[0] == 0:
         return None
     i = int(past[0])
+    if done[i:].min() < BACK:
+        return None  # a crest of hum nearly as large as the step
     if time[i] - time[i - 1] > 1.5 * np.median(np.diff(time)):
         return None  # it came in a gap
     part = (0.5 - done[i - 1]) / (done[i] - done[i - 1])

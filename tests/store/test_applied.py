@@ -59,6 +59,26 @@ def test_levels_come_from_the_read_back_and_edges_from_the_shunt():
     assert found.steps[1:, 0] == pytest.approx(CAME[1:], abs=1.5e-3)
 
 
+@pytest.mark.parametrize("hum", [0.012, 0.025, 0.04])
+def test_a_crest_of_hum_is_no_edge(hum):
+    """Steps of 60 mA, each heard of 7 ms late, under a hum of up to 40 mA."""
+    came = 0.2 + 0.1437 * np.arange(30)
+    level = 0.06 * (np.arange(31) % 2)
+    time = np.arange(0, came[-1] + 0.2, 5e-4)
+    value = level[np.searchsorted(came, time, side="right")]
+    value = value + hum * np.sin(2 * np.pi * 50 * time + 1.0)
+
+    def seen(start, end):
+        inside = (time >= start) & (time < end)
+        return time[inside], value[inside]
+
+    found = applied_current(
+        np.append(0.0, came + 7e-3), level, np.full(31, np.nan), seen
+    )
+    early = came + 7e-3 - found.steps[1:, 0]
+    assert np.median(np.abs(early - 7e-3)) < 2e-3 if found.edges else not early.any()
+
+
 def test_an_edge_in_a_gap_of_the_shunt_keeps_the_host_s_time():
     found = applied_current(*rows(), shunt(blind=(1.99, 2.02)))
     assert found.edges == 2
