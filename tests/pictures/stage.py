@@ -113,7 +113,7 @@ class Stage:
         self.live(0.15)
         file = self.folder / f"{name}.png"
         seen = self._grabbed().toImage().convertToFormat(FORMAT)
-        _image(seen).quantize(256, dither=Image.Dither.NONE).save(file, optimize=True)
+        _in_256_colours(_image(seen)).save(file, optimize=True)
         print(file, flush=True)
 
     def _grabbed(self) -> QPixmap:
@@ -180,6 +180,16 @@ def _image(seen: QImage) -> Image.Image:
     """The same, in `FORMAT`, as Pillow has it."""
     rows = seen.constBits(), "raw", "RGB", seen.bytesPerLine()
     return Image.frombytes("RGB", (seen.width(), seen.height()), *rows)
+
+
+def _in_256_colours(picture: Image.Image) -> Image.Image:
+    """The commonest as they are, for what is flat, and some for all other hues."""
+    found = picture.getcolors(1 << 24) or []
+    common = [part for _, colour in sorted(found)[:-193:-1] for part in colour]
+    others = picture.quantize(64, Image.Quantize.MAXCOVERAGE).getpalette() or []
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*common, *others[:192]])
+    return picture.quantize(palette=palette, dither=Image.Dither.NONE)
 
 
 @contextmanager
