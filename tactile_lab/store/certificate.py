@@ -100,7 +100,7 @@ class Certificate:
         else:
             spikes = (
                 f"{self.spikes} of "
-                f"{count(max(self.online, self.offline or 0), 'spike')}"
+                f"{count(max(self.online, self.offline or 0), 'spike')} in them"
             )
         return f"loss: {samples}, {spikes}"
 

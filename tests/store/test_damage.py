@@ -52,7 +52,8 @@ def damage(path, offset, flip=0x10):
 def test_sound_run_has_nothing_lost(complete):
     verdict = verify(complete)
     assert verdict.sound
-    assert str(verdict.certificate) == "loss: 0 of 10,000 samples, 0 of 7 spikes"
+    told = "loss: 0 of 10,000 samples, 0 of 7 spikes in them"
+    assert str(verdict.certificate) == told
     loss = json.loads((complete / "run.json").read_text())["loss"]
     assert (loss["samples"], loss["spikes"]) == (0, 0)
 
