@@ -26,6 +26,7 @@ KEYS = {
     "savings",
     "suggestions",
     "resolution",
+    "carried_over",
     "preview",
     "assumptions",
     "warnings",

@@ -92,6 +92,7 @@ def test_a_list_read_anew_keeps_keyboard_and_choice(lab, window) -> None:
     window.review.show_tab(1)
     window.screen_.list_runs()
     lab.until(lambda: folders <= {card.entry.folder for card in runs.cards})
+    lab.until(lambda: runs.cards[1].isVisible())
     runs.cards[1].setFocus()
     chosen = runs.cards[1].entry
     runs._show()
