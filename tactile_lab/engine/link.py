@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
@@ -115,6 +116,7 @@ class Link:
         self._rest, self._used = rest, time.monotonic()
         self._separate, self._realtime, self._lost = separate, realtime, lost
         self._pipe: Connection | None = None
+        self._outbox: SimpleQueue[bytes | None] = SimpleQueue()
         self._process: EngineProcess | threading.Thread | None = None
         self._tasks: dict[int, RemoteTask] = {}
         self._asked: dict[int, Callable[[Reply[Any]], None]] = {}
@@ -238,11 +240,11 @@ class Link:
             self._write((number, Engine.say, act, arguments, named))
 
     def _write(self, asked: object) -> None:
-        try:
-            if self._pipe is not None:
-                self._pipe.send(asked)
-        except OSError:
-            pass  # the reading thread sees the end of the pipe too, and tells
+        """Have it sent; a pipe is full where an engine starts, and holds up nobody."""
+        if self._pipe is not None:
+            self._outbox.put(bytes(ForkingPickler.dumps(asked)))
+            if asked is None:
+                self._outbox.put(None)
 
     def _open(self) -> None:
         self._pipe, theirs = multiprocessing.Pipe()
@@ -251,10 +253,17 @@ class Link:
         else:
             served = Engine(theirs, realtime=self._realtime)
             self._process = start(served.serve, "engine")
-        ours = self._pipe
-        start(lambda: self._read(ours), "link")
+        self._outbox = SimpleQueue()
+        ours, outbox, sending = self._pipe, self._outbox, threading.Lock()
+        start(lambda: _pass_on(outbox, ours, sending), "link out")
+        start(lambda: self._read(ours, outbox, sending), "link")
 
-    def _read(self, pipe: Connection) -> None:
+    def _read(
+        self,
+        pipe: Connection,
+        outbox: SimpleQueue[bytes | None],
+        sending: threading.Lock,
+    ) -> None:
         why = "The pipe to it ended"
         try:
             while True:
@@ -263,8 +272,10 @@ class Link:
             pass
         except Exception as error:  # what a user's own protocol sends may not unpickle
             why = f"{type(error).__name__}: {error}"
+        outbox.put(None)
         with self._lock:
-            pipe.close()
+            with sending:
+                pipe.close()
             if pipe is not self._pipe:
                 return  # it was let rest
             self._pipe = None
@@ -288,3 +299,15 @@ class Link:
             if task.hear is not None:
                 self._inbox.put((task.hear, told))
             task.take(told)
+
+
+def _pass_on(
+    outbox: SimpleQueue[bytes | None], pipe: Connection, sending: threading.Lock
+) -> None:
+    """Send what is asked of an engine, until None or the end of its pipe."""
+    try:
+        while (asked := outbox.get()) is not None:
+            with sending:
+                pipe.send_bytes(asked)
+    except OSError:
+        pass  # the reading thread sees the end of the pipe too, and tells

@@ -1,6 +1,8 @@
 """A plain script at the pipe: no window, no Qt."""
 
 import gc
+import os
+import signal
 import subprocess
 import sys
 import threading
@@ -10,7 +12,7 @@ from multiprocessing import Pipe
 from pathlib import Path
 
 import pytest
-from engine_answers import answered, pid_of
+from engine_answers import answered, pid_of, size_of
 
 from tactile_lab.acquisition.events import RunState, SpikesSeen
 from tactile_lab.engine import engine as module
@@ -193,6 +195,27 @@ def test_an_engine_of_which_nothing_is_asked_ends_and_the_next_question_starts_o
         assert not Path(f"/proc/{first.value}").exists(), "it is still there"
     assert not first.lost and not second.lost and lost == []
     assert first.value != second.value
+
+
+def test_a_question_is_asked_at_once_though_the_engine_does_not_read_it_yet():
+    """The window would stand meanwhile, and STOP with it."""
+    large, replies = bytes(1 << 20), []
+    with Link() as link:
+        pid = answered(link, pid_of).value
+        os.kill(pid, signal.SIGSTOP)
+        while ") T " not in Path(f"/proc/{pid}/stat").read_text():
+            time.sleep(0.001)
+        asked = threading.Thread(
+            target=link.ask, args=(replies.append, size_of, large), daemon=True
+        )
+        asked.start()
+        asked.join(10)
+        waits = asked.is_alive()
+        os.kill(pid, signal.SIGCONT)
+        while not replies:
+            link.poll()
+            time.sleep(0.001)
+    assert replies[0].value == len(large) and not waits
 
 
 def test_an_engine_gives_back_what_ended_tasks_left(

@@ -16,6 +16,11 @@ def pid_of(engine: Engine) -> int:
     return os.getpid()
 
 
+def size_of(engine: Engine, asked: bytes) -> int:
+    """Of what came along with the question."""
+    return len(asked)
+
+
 def answered(link: Link, act: Callable[[Engine], T]) -> Reply[T]:
     """The reply of the engine to a question, waited for."""
     told: list[Reply[T]] = []
