@@ -240,9 +240,9 @@ class CoilThread(InstrumentThread):
         self.off = self.coil.safe_off()
         if last is not None and abs(last.setpoint) > RESOLUTION:  # it fell from there
             for one in self.off.fall:
-                asked, answered = one.asked, one.acted
+                asked, acted = one.asked, one.acted
                 self._note(
-                    Applied(asked, one.heard, one.setpoint, None, answered=answered)
+                    Applied(asked, one.heard, one.setpoint, None, answered=acted)
                 )
             if self.off.verified:
                 self._note(Applied(asked, self.clock.now(), 0.0, self.off.current))

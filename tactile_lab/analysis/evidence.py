@@ -27,7 +27,7 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import I_C
-from tactile_lab.model.simulate import simulate
+from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.waveform import Waveform
 
 VOLTAGES = frozenset({"V_GS", "V_S", "V_th", "V_fire", "V_reset"})
@@ -101,10 +101,7 @@ class Residuals:
 
     def under(self, driven: DrivenCircuit) -> FloatArray:
         """All residuals of a circuit and its force, V: of V_C1, then at firing."""
-        circuit, force = driven
-        found = simulate(
-            circuit, force, keep=("V_C1",), until=self._duration, tolerance=1e-7
-        )
+        (circuit, force), found = driven, self._solved(driven)
         parts = []
         if self._trace is not None:
             parts.append(self._trace.value - self._trace.modelled(found))
@@ -113,8 +110,7 @@ class Residuals:
                 _grid(force.time, a, b)
                 for a, b in zip(self._earlier, self._later, strict=True)
             ]
-            everywhere = np.concatenate(grids)
-            current = I_C(circuit, found.sample("V_C1", everywhere)) + circuit.I_bias
+            current = _charging(circuit, found, np.concatenate(grids))
             parts.append(_at_firing(circuit, grids, current))
         return np.concatenate(parts) if parts else np.empty(0)
 
@@ -123,16 +119,18 @@ class Residuals:
 
         Of the earlier spike, and of the later one.
         """
-        circuit, force = driven
-        found = simulate(
-            circuit, force, keep=("V_C1",), until=self._duration, tolerance=1e-7
-        )
-        ends = np.column_stack([self._earlier, self._later])
-        current = I_C(circuit, found.sample("V_C1", ends.ravel())) + circuit.I_bias
+        circuit, ends = driven.circuit, np.column_stack([self._earlier, self._later])
+        current = _charging(circuit, self._solved(driven), ends.ravel())
         at = np.array([circuit.reset_voltage, circuit.fire_voltage])
         slope = current.reshape(ends.shape) / circuit.C2 - at / circuit.tau_L
         left = np.exp((self._earlier - self._later) / circuit.tau_L)
         return np.column_stack([-slope[:, 0] * left, slope[:, 1]])
+
+    def _solved(self, driven: DrivenCircuit) -> Result:
+        circuit, force = driven
+        return simulate(
+            circuit, force, keep=("V_C1",), until=self._duration, tolerance=1e-7
+        )
 
     @property
     def follows(self) -> NDArray[np.bool_]:
@@ -317,6 +315,11 @@ class Scatter:
 def scatter(residual: FloatArray) -> float:
     """Root mean square, V."""
     return float(np.sqrt(np.mean(residual**2)))
+
+
+def _charging(circuit: Circuit, found: Result, time: FloatArray) -> FloatArray:
+    """Current that charges C2 at times, s, in A."""
+    return np.asarray(I_C(circuit, found.sample("V_C1", time)) + circuit.I_bias)
 
 
 def _at_firing(

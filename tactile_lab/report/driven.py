@@ -21,9 +21,7 @@ def told(run: Run) -> tuple[str, ...]:
     steps = len(applied.steps)
     if steps < 2:
         return ()
-    rows = run.current
-    by_list = "listed" in (rows.dtype.names or ()) and bool(rows["listed"].any())
-    if by_list and shunt is None:
+    if shunt is None and played(run):
         return (
             "coil current: as asked for while a list or the generator played, which "
             "nothing measured: a source that gives another current shows in no number "
@@ -42,6 +40,12 @@ def told(run: Run) -> tuple[str, ...]:
             f"({ratio.low:.4g} to {ratio.high:.4g}) of the source"
         )
     return (said,)
+
+
+def played(run: Run) -> bool:
+    """Whether the current was played as a waveform, not set point by point."""
+    rows = run.current  # older runs lack the column
+    return "listed" in (rows.dtype.names or ()) and bool(rows["listed"].any())
 
 
 def shunt_over_source(applied: AppliedCurrent, shunt: Shunt) -> Estimate | None:

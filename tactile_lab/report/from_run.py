@@ -19,7 +19,7 @@ from tactile_lab.instruments.registry import coil_capability
 from tactile_lab.measurement import MeasuredTrial, RecordedSignal
 from tactile_lab.model.temperature import temperature
 from tactile_lab.quantity import count, exact, show
-from tactile_lab.report.driven import told
+from tactile_lab.report.driven import played, told
 from tactile_lab.report.mains import told as mains_told
 from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.scene.scene import Scene
@@ -77,7 +77,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             belief=_belief(run, scene),
             compared=scene.compared,
             displaced=scene.displaced,
-            listed=_played(run),
+            listed=played(run),
             lag_uncertainty=scene.bench.magnet.lag_uncertainty,
             searched=bool({"spikes", "rate"} & set(scene.record.signals)),
             start=scene.start,
@@ -203,7 +203,7 @@ def _trials(run: Run) -> tuple[MeasuredTrial, ...]:
 
 def _as_it_fell(run: Run) -> tuple[str, ...]:
     """How many spikes came after the run was stopped, which are no trial's."""
-    if run.completed.all():
+    if ended(run.records("trials")).all():
         return ()
     fell = np.count_nonzero(run.spikes["time"] >= run.stopped)
     if not fell:
@@ -283,12 +283,6 @@ def _warming(run: Run) -> float | None:
     ratio = rows["resistance_ratio"]
     ratio = ratio[np.isfinite(ratio)]
     return float(ratio[-1] - ratio[0]) / COPPER if ratio.size > 1 else None
-
-
-def _played(run: Run) -> bool:
-    """Whether the current was played as a waveform, not set point by point."""
-    rows = run.current  # older runs lack the column
-    return "listed" in (rows.dtype.names or ()) and bool(rows["listed"].any())
 
 
 def _field_per_ampere(scene: Scene) -> float:

@@ -307,11 +307,6 @@ class StoredRun:
         return float(min(rows["time"][rows["kind"] == b"stopping"], default=np.inf))
 
     @property
-    def completed(self) -> NDArray[np.bool_]:
-        """Which trials came to their end; older runs stored only those."""
-        return ended(self.records("trials"))
-
-    @property
     def current(self) -> Records:
         """Applied current: time (s), setpoint and measured (A; NaN where not read).
 

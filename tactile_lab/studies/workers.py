@@ -246,9 +246,8 @@ class _Processes(ProcessPoolExecutor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the workers, whatever they are at."""
-        super().shutdown(wait=False, cancel_futures=cancel_futures)
         self._tell.send_bytes(b"end")  # nobody takes it out: all of them see it
-        super().shutdown(wait=wait)
+        super().shutdown(wait, cancel_futures=cancel_futures)
 
 
 def _end_when(told: Connection) -> None:

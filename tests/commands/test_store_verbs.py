@@ -4,16 +4,15 @@ import json
 import runpy
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
+from growing_run import begins_a_trial
 
 from tactile_lab.cli import cli
 from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
-from tactile_lab.store.run import Run
 from tactile_lab.store.verify import verify
 
 BENCH = runpy.run_path(str(Path(__file__).parents[1] / "store" / "conftest.py"))
@@ -112,8 +111,8 @@ def test_a_run_that_begins_a_trial_while_it_is_described(run, monkeypatch):
     """As the window's page on a run that goes on may find it."""
     from tactile_lab.commands.show import describe
 
-    before, read = len(describe(run)["trials"]), Run.completed.fget
-    monkeypatch.setattr(Run, "completed", property(lambda r: np.append(read(r), False)))
+    before = len(describe(run)["trials"])
+    begins_a_trial(monkeypatch)
     assert len(describe(run)["trials"]) == before
 
 

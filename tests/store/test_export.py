@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.io
 from full_disk import full_after
+from growing_run import begins_a_trial
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.export import csv as to_csv
@@ -73,10 +74,10 @@ def test_csv_has_units_in_its_header_and_si_values(run, tmp_path):
 
 
 def test_a_run_that_begins_a_trial_while_it_is_exported(run, tmp_path, monkeypatch):
-    read = Run.completed.fget
-    monkeypatch.setattr(Run, "completed", property(lambda r: np.append(read(r), False)))
+    before = run.trials.size
+    begins_a_trial(monkeypatch)
     to_csv.export(run, tmp_path, Selection())
-    assert len(rows(tmp_path / "trials.csv")) == 1 + run.trials.size
+    assert len(rows(tmp_path / "trials.csv")) == 1 + before
 
 
 def test_a_part_at_a_lower_rate_is_averaged_and_keeps_gaps_apart(run, tmp_path):

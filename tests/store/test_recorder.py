@@ -17,6 +17,7 @@ from tactile_lab.store.layout import Layout
 from tactile_lab.store.overrange import told, unsearched
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.store.run import Run
+from tactile_lab.store.stored_run import ended
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
 
@@ -178,7 +179,7 @@ def test_a_trial_has_one_row_from_its_begin_on(bench, recorder, folder):
     bench.play(recorder, bench.codes(4000), 500)  # 4 s, a spike every 0.701 s
     recorder.close("aborted", 4000)
     with Run.load(folder.path) as run:
-        assert run.completed.tolist() == [True, False]
+        assert ended(run.records("trials")).tolist() == [True, False]
         assert run.duration == pytest.approx(4.0)
         assert run.trials["end"] == pytest.approx([2.5, 4.0])
         assert run.trials["hold_end"] == pytest.approx([2.25, 1.5])
