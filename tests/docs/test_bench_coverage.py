@@ -4,8 +4,7 @@ import runpy
 from pathlib import Path
 
 import pytest
-
-PAGE = Path(__file__).parents[2] / "docs" / "make_bench_coverage.py"
+from bench_coverage_page import table
 
 
 @pytest.mark.parametrize(
@@ -20,13 +19,12 @@ def test_one_number_repeated_is_no_share_of_hits(values, share):
         }
         for seed, value in enumerate(values)
     ]  # fmt: skip
-    page = runpy.run_path(str(PAGE))["table"](rows)
+    page = table(rows)
     (row,) = [line for line in page.splitlines() if "| offset of" in line]
     assert row.split(" | ")[3] == share
 
 
 def test_a_case_that_was_not_measured_here_stays_on_the_page():
-    made = runpy.run_path(str(PAGE))
     line = (
         "| wiring_check | V_GS | 26 in 26 | 100.0 % | 86.8 to 100.0 % | cannot tell "
         "| -0.03 | 0.21 | 0 of 26 | – | 0000000 |"
@@ -35,7 +33,7 @@ def test_a_case_that_was_not_measured_here_stays_on_the_page():
         "case": "rate_force, three forces", "seed": 0, "commit": "1111111",
         "cpu": 1.0, "told": [["V_GS", 0.5, 0.0, 1.0, 0.2]],
     }  # fmt: skip
-    page = made["table"]([row], f"| run |\n{line}\n| rate_force, three forces | old |")
+    page = table([row], f"| run |\n{line}\n| rate_force, three forces | old |")
     assert line in page
     assert "| old |" not in page
     assert "| rate_force, three forces | V_GS | 1 in 1 |" in page
@@ -59,7 +57,7 @@ def test_93_to_97_is_said_of_runs_that_can_tell_it(runs, outside, said):
         for seed, held in enumerate([False] * outside + [True] * (runs - outside))
     ]  # fmt: skip
     rows[-1]["told"][0][1] = 1.01  # or it is one number repeated
-    page = runpy.run_path(str(PAGE))["table"](rows)
+    page = table(rows)
     (row,) = [line for line in page.splitlines() if "F(0) by the field |" in line]
     cells = row.split(" | ")
     assert cells[2] == f"{3 * runs} in {runs}"
@@ -74,13 +72,13 @@ def test_what_is_told_as_a_bound_is_not_held_to_be_an_interval():
         }
         for seed in range(200)
     ]  # fmt: skip
-    page = runpy.run_path(str(PAGE))["table"](rows)
+    page = table(rows)
     (row,) = [line for line in page.splitlines() if "| V_GS |" in line]
     assert row.split(" | ")[5] == "told as a bound"
 
 
 def test_every_page_that_measures_is_listed_with_what_it_measures():
-    root = PAGE.parent.parent
+    root = Path(__file__).parents[2]
     made = runpy.run_path(str(root / "docs" / "make_reports.py"))
     for name, paths in made["PAGES"].items():
         assert (root / "docs" / f"{name}.md").exists()

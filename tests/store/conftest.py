@@ -8,6 +8,7 @@ import pytest
 from tactile_lab.scope import Block, Channel, Stream
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.spikes.detector import detector_of
+from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
@@ -87,3 +88,13 @@ def folder(tmp_path):
 @pytest.fixture
 def recorder(folder, layout):
     return Recorder(folder, layout, reserve=0)
+
+
+@pytest.fixture
+def complete(bench, recorder, folder):
+    """A sound run of 5 chunks of 1024 samples, the last one short."""
+    bench.play(recorder, bench.codes(5000), 500)
+    recorder.current(1.0, 0.5, 0.5)
+    recorder.close("complete", 5000)
+    write_certificate(folder.path)
+    return folder.path

@@ -1,6 +1,6 @@
 """Writes a run until it is killed; says where, then how many samples it handed over.
 
-Not a test: `test_damage` starts it. Arguments: root, samples, samples per block.
+Not a test: `test_killed_run` starts it. Arguments: root, samples, samples per block.
 """
 
 import runpy
