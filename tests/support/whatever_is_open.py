@@ -92,7 +92,7 @@ def openers(lab, tmp_path: Path) -> dict[str, tuple[Open, ...]]:
         "lanes/stack.py": (lane_menu,),
         "lanes/tools.py": (window.centre.tools.lanes.click,),
         "menu.py": (acts.show_menu,),
-        "plots/small_plot.py": (plot_menu,),
+        "plots/plot_box.py": (plot_menu,),
         "lanes_window.py": (window.part_lanes,),
         "review/runs.py": (lambda: window.review.runs._show_menu(entry, QPoint(9, 9)),),
         "screen/screen.py": (window.screen_.ask_scene, window.screen_.ask_run),
