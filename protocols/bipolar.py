@@ -91,8 +91,9 @@ class Bipolar(Levels):
         if run.force_uncertainty is None:
             said.append(NOT_STATED)
         said.append(
-            f"The decays give tau = {tau.text('s')}, with R1, R2 and V_S as given; one "
-            "code of offset of V_C1 and its converter's steps are in the interval."
+            f"The decays give tau = {tau.text('s')}, with V_S as given; one code of "
+            "offset of V_C1, its converter's steps and the tolerance of R1 and R2 are "
+            "in the interval."
         )
         values = {
             "I_DS_changes": found,
@@ -195,15 +196,25 @@ def _changes(
         conductance = 1 / run.circuit.R1 + 1 / run.circuit.R2
     code = (0.0 if V_C1 is None else V_C1.code or 0.0) * conductance
     steps = run.step_bias("V_C1") * conductance
-    resistors = _resistors(run.circuit, conductance)
-    moved = [fitted(*cause) for cause in ((code, 0.0), (0.0, steps)) if any(cause)]
-    log_tau = math.log(decay.tau.value)
+    resistors, shifted = _resistors(run.circuit, conductance)
+    causes = (math.hypot(code, shifted), 0.0), (0.0, steps)
+    # either way: tau does not follow an offset in proportion
+    moved = [
+        (fitted(*cause), fitted(*(-size for size in cause)))
+        for cause in causes
+        if any(cause)
+    ]
     logarithm = Estimate(
-        log_tau,
+        math.log(decay.tau.value),
         decay.tau.error / decay.tau.value,
         math.log(decay.tau.low),
         math.log(decay.tau.high),
-    ).widened(*(abs(math.log(other.tau.value) - log_tau) for other, _ in moved))
+    ).spanned(
+        *(
+            (math.log(up.tau.value), math.log(down.tau.value))
+            for (up, _), (down, _) in moved
+        )
+    )
     tau = Estimate(
         decay.tau.value, decay.tau.value * logarithm.error,
         math.exp(logarithm.low), math.exp(logarithm.high),
@@ -218,17 +229,24 @@ def _changes(
             float(changed[i]) - there * amplitude.half,
             float(changed[i]) + there * amplitude.half,
         )  # fmt: skip
-        shifts = (abs(float(other[i] - changed[i])) for _, other in moved)
+        shifts = (abs(float(up[i] - down[i])) / 2 for (_, up), (_, down) in moved)
         by_resistors = resistors * float(changed[i])
         changes.append(known.widened(*shifts, 2 * noise, steps, by_resistors))
     return tau, changes
 
 
-def _resistors(circuit: Circuit | None, conductance: float) -> float:
-    """Half of the 95 % band of node A's conductance, 1/Ohm, as a part of it."""
+def _resistors(circuit: Circuit | None, conductance: float) -> tuple[float, float]:
+    """What the tolerance of R1 and R2 leaves open of I_DS by Eq. (16), 95 %.
+
+    The one part is in proportion to it, by node A's conductance, 1/Ohm; the other is
+    of all currents alike, A.
+    """
     if circuit is None:
-        return 0.0
-    return RESISTOR * math.hypot(1 / circuit.R1, 1 / circuit.R2) / conductance
+        return 0.0, 0.0
+    part = RESISTOR * math.hypot(1 / circuit.R1, 1 / circuit.R2) / conductance
+    # V_S/(R1 + R2) flows through both where no drain current does
+    alike = math.sqrt(2) * RESISTOR * circuit.V_S / (circuit.R1 + circuit.R2)
+    return part, alike
 
 
 def _scatter(run: Measurement) -> float:

@@ -78,6 +78,21 @@ class Estimate:
             self.value + math.sqrt((self.high - self.value) ** 2 + more),
         )
 
+    def spanned(self, *ends: tuple[float, float]) -> Estimate:
+        """With further independent causes: what it is at the ends of their 95 % bands.
+
+        Each side of the interval grows by what lies on it, which half of the distance
+        does not tell where a number does not follow its causes in proportion.
+        """
+        below = sum((self.value - min(*pair, self.value)) ** 2 for pair in ends)
+        above = sum((max(*pair, self.value) - self.value) ** 2 for pair in ends)
+        return Estimate(
+            self.value,
+            math.sqrt(self.error**2 + (below + above) / 2 / Z95**2),
+            self.value - math.sqrt((self.value - self.low) ** 2 + below),
+            self.value + math.sqrt((self.high - self.value) ** 2 + above),
+        )
+
     def scaled(self, factor: float) -> Estimate:
         """In another unit: times a `factor` that is exact."""
         low, high = sorted((self.low * factor, self.high * factor))

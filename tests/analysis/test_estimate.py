@@ -1,5 +1,7 @@
 """A number with its interval, as it is printed."""
 
+import math
+
 import pytest
 
 from tactile_lab.analysis.estimate import Estimate
@@ -31,3 +33,12 @@ def test_the_ends_of_an_interval_are_told_apart(value, half, text):
 )
 def test_a_number_has_the_unit_that_suits_it(value, half, unit, text):
     assert Estimate(value, half / 2, value - half, value + half).shown(unit) == text
+
+
+def test_a_cause_that_acts_more_one_way_widens_that_side_more():
+    told = Estimate(1.0, 0.1, 0.8, 1.2).spanned((0.7, 1.5), (0.9, 1.0))
+    assert told.low == pytest.approx(1 - math.sqrt(0.2**2 + 0.3**2 + 0.1**2))
+    assert told.high == pytest.approx(1 + math.sqrt(0.2**2 + 0.5**2))
+    assert told.value == 1.0
+    # both ends on one side: the other does not grow
+    assert Estimate(1.0, 0.1, 0.8, 1.2).spanned((1.1, 1.2)).low == 0.8

@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from modelled_runs import modelled
 
 from tactile_lab.model.circuit import Circuit
@@ -15,8 +16,8 @@ from tactile_lab.waveform import Waveform
 CODE = 4.0 / 254
 
 
-def pushed_and_pulled(seed, *, late=0.06):
-    """A `bipolar` run of +-80 mN as an 8 bit scope shows it; forces come `late` s."""
+def pushed_and_pulled(seed, *, late=0.06, code=CODE):
+    """A `bipolar` run of +-80 mN by a scope of such codes, V; forces come `late` s."""
     steps = []
     for level in (0.08, -0.08):
         pulse = Waveform.pulse(level, ramp=0.25, hold=5.0, rest=4.0)
@@ -27,8 +28,8 @@ def pushed_and_pulled(seed, *, late=0.06):
     held = tuple(replace(t, hold=t.level and (0.25, 5.25)) for t in run.trials)
     V_C1, rng = run.traces[0], np.random.default_rng(seed)
     noisy = V_C1.mean[:, None] + rng.normal(0, 5e-3, (2000, 100))
-    shown = 2.5 + CODE * np.rint((noisy - 2.5) / CODE).mean(axis=1)
-    seen = replace(V_C1, mean=shown, code=CODE, samples=100)
+    shown = 2.5 + code * np.rint((noisy - 2.5) / code).mean(axis=1)
+    seen = replace(V_C1, mean=shown, code=code, samples=100)
     return replace(run, trials=held[1:], traces=(seen,))
 
 
@@ -50,6 +51,22 @@ def test_bipolar_s_intervals_hold_though_the_converter_has_steps():
             # R1 is known to 1 %, and it carries most of the current
             least = 0.009 * abs(change["change_A"])
             assert change["change_uncertainty_A_95"] > least
+
+
+@pytest.mark.parametrize("resistor", ["R1", "R2"])
+def test_tau_holds_though_a_resistor_is_other_than_believed_by_its_tolerance(resistor):
+    run = pushed_and_pulled(0, code=1e-5)
+    told = getattr(run.circuit, resistor)
+    for part in (-0.01, 0.01):
+        believed = replace(run.circuit, **{resistor: told * (1 + part)})
+        tau = find(replace(run, circuit=believed)).conclusion.values["tau_s"]
+        assert tau.low < 8.69 < tau.high
+        assert tau.half < 0.05
+
+
+def test_tau_s_interval_reaches_further_where_an_offset_moves_it_further():
+    tau = find(pushed_and_pulled(0)).conclusion.values["tau_s"]
+    assert np.log(tau.high / tau.value) > 1.05 * np.log(tau.value / tau.low)
 
 
 def _changed_by_eq_8(run, level):
