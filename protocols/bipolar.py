@@ -16,7 +16,7 @@ from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import NOT_STATED, Conclusion
 from tactile_lab.errors import NotIdentifiableError
-from tactile_lab.measurement import MeasuredTrial, Measurement
+from tactile_lab.measurement import MeasuredTrial, Measurement, RecordedSignal
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.drain_current import BOXCAR_3DB
 from tactile_lab.model.specimen import RESISTOR
@@ -230,9 +230,23 @@ def _changes(
             float(changed[i]) + there * amplitude.half,
         )  # fmt: skip
         shifts = (abs(float(up[i] - down[i])) / 2 for (_, up), (_, down) in moved)
+        left = steps * _unsmoothed(V_C1, *holds[i])
         by_resistors = resistors * float(changed[i])
-        changes.append(known.widened(*shifts, 2 * noise, steps, by_resistors))
+        changes.append(known.widened(*shifts, 2 * noise, left, by_resistors))
     return tau, changes
+
+
+def _unsmoothed(V_C1: RecordedSignal | None, start: float, end: float) -> float:
+    """Part of a converter's error that a hold leaves by passing over its steps.
+
+    What they make of a slow voltage is a sine of it (`analysis.converter`), whose mean
+    over several periods is at most one over pi times their number.
+    """
+    if V_C1 is None or not V_C1.code:
+        return 1.0
+    inside = (V_C1.time >= start + SETTLING) & (V_C1.time <= end)
+    passed = np.ptp(V_C1.mean[inside]) / V_C1.code if inside.any() else 0.0
+    return min(1.0, 1 / (math.pi * max(float(passed), 1e-9)))
 
 
 def _resistors(circuit: Circuit | None, conductance: float) -> tuple[float, float]:

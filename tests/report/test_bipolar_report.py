@@ -1,6 +1,7 @@
 """What a report concludes from a push and a pull."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from tactile_lab.waveform import Waveform
 CODE = 4.0 / 254
 
 
-def pushed_and_pulled(seed, *, late=0.06, code=CODE):
+def pushed_and_pulled(seed, *, late=0.06, code=CODE, noise=5e-3):
     """A `bipolar` run of +-80 mN by a scope of such codes, V; forces come `late` s."""
     steps = []
     for level in (0.08, -0.08):
@@ -27,7 +28,7 @@ def pushed_and_pulled(seed, *, late=0.06, code=CODE):
     run = modelled("bipolar", [quiet, *steps], searched=False, bins=2000)
     held = tuple(replace(t, hold=t.level and (0.25, 5.25)) for t in run.trials)
     V_C1, rng = run.traces[0], np.random.default_rng(seed)
-    noisy = V_C1.mean[:, None] + rng.normal(0, 5e-3, (2000, 100))
+    noisy = V_C1.mean[:, None] + rng.normal(0, noise, (2000, 100))
     shown = 2.5 + code * np.rint((noisy - 2.5) / code).mean(axis=1)
     seen = replace(V_C1, mean=shown, code=code, samples=100)
     return replace(run, trials=held[1:], traces=(seen,))
@@ -67,6 +68,15 @@ def test_tau_holds_though_a_resistor_is_other_than_believed_by_its_tolerance(res
 def test_tau_s_interval_reaches_further_where_an_offset_moves_it_further():
     tau = find(pushed_and_pulled(0)).conclusion.values["tau_s"]
     assert np.log(tau.high / tau.value) > 1.05 * np.log(tau.value / tau.low)
+
+
+def test_a_converter_s_steps_count_once_where_a_hold_passes_over_several():
+    run = pushed_and_pulled(0, noise=2e-3)
+    steps = run.step_bias("V_C1") * (1 / run.circuit.R1 + 1 / run.circuit.R2)
+    for change in find(run).conclusion.values["I_DS_changes"]:
+        resistors = 0.01 * change["change_A"]
+        told = math.sqrt(change["change_uncertainty_A_95"] ** 2 - resistors**2)
+        assert steps < told < 1.4 * steps
 
 
 def _changed_by_eq_8(run, level):
