@@ -82,8 +82,10 @@ from tactile_lab.model.pair import (
     end_inside,
     first_crossing,
     flow,
+    series_room,
     shortened,
 )
+from tactile_lab.model.scratch import borrowed, room_for
 from tactile_lab.model.spiking import (
     COUNT,
     DOUBT,
@@ -126,6 +128,10 @@ PATIENCE = 6
 FEW_UNITS = 4.0
 """A collocated step shorter than this, in units of the fastest rate, is not stiff."""
 
+nodes_room, flow_room, step_room = room_for(2 * ORDER), room_for(FLOW), room_for(STEP)
+matrix_room, right_room = room_for(2 * ORDER, 2 * ORDER), room_for(2 * ORDER, COLUMNS)
+taylor_room = room_for(ROWS, MOST + 2)
+
 
 @inner
 def restart(
@@ -161,6 +167,7 @@ def _build(stamp: int) -> Callable[..., Any]:
         _ = stamp
         status = DONE
         time, force = points_between(wave_time, wave, start, force_before, until)
+        par, S = borrowed(par), borrowed(S)
         E = S[ERRORS:]
         S[FORCE] = force[-1]
         if not abs(k_F) * largest_of(force) <= LARGEST_VOLTAGE:
@@ -169,18 +176,10 @@ def _build(stamp: int) -> Callable[..., Any]:
         step_rows = np.empty((16, STEP_ROW))
         piece_rows = np.empty((16, PIECE_ROW))
         spikes = np.empty(64)
-        W = np.empty(2 * ORDER)
-        f = np.empty(FLOW)
-        g = np.empty(FLOW)
-        m = np.empty(FLOW)
-        matrix = np.empty((2 * ORDER, 2 * ORDER))
-        right = np.empty((2 * ORDER, COLUMNS))
-        a = np.empty(ORDER + 1)
-        b = np.empty(ORDER + 1)
-        part = np.empty(ORDER + 1)
-        d = np.empty(ORDER + 1)
-        c = np.empty((ROWS, MOST + 2))
-        step = np.zeros(STEP)
+        W, matrix, right = nodes_room(), matrix_room(), right_room()
+        f, g, m = flow_room(), flow_room(), flow_room()
+        a, b, part, d = series_room(), series_room(), series_room(), series_room()
+        c, step = taylor_room(), step_room()
         for k in range(time.size - 1 if status == DONE else 0):
             T = time[k + 1] - time[k]
             if T < SHORTEST_SEGMENT:

@@ -37,6 +37,7 @@ from tactile_lab.model.node_a import (
     equilibrium,
     slope_at,
 )
+from tactile_lab.model.scratch import borrowed, room_for
 from tactile_lab.model.spiking import (
     COUNT,
     EPS,
@@ -78,6 +79,11 @@ FRESH = np.zeros(ERRORS + 3)
 FRESH[RESUME] = -1.0
 FRESH[LAST] = FRESH[PREVIOUS] = -np.inf
 FRESH[SHORTEST] = np.inf
+
+nodes_room, matrix_room = room_for(ROWS), room_for(ORDER, ORDER)
+series_room, points_room = room_for(ORDER + 1), room_for(3 * (ORDER + 1))
+q_room, P_room = room_for(ORDER + 2), room_for(2 * MOST_TERMS + 2)
+fires_room = room_for(4)
 
 
 @inner
@@ -190,16 +196,13 @@ def _build(stamp: int) -> Callable[..., Any]:
         step_rows = np.empty((16, STEP_ROW))
         piece_rows = np.empty((16, PIECE_ROW))
         spikes = np.empty(64)
-        nodes = np.empty(ROWS)
-        matrix = np.empty((ORDER, ORDER))
-        values = np.empty(ORDER + 1)
-        part = np.empty(3 * (ORDER + 1))
+        par, S = borrowed(par), borrowed(S)
+        nodes, matrix = nodes_room(), matrix_room()
+        values, a, part = series_room(), series_room(), points_room()
         Q = part[ORDER + 1 :]
-        a = np.empty(ORDER + 1)
-        q = np.zeros(ORDER + 2)
-        P = np.empty(2 * MOST_TERMS + 2)
-        fires = np.empty(4)
-        piece_fires = np.empty(4)
+        q, P = q_room(), P_room()
+        q[ORDER + 1] = 0.0
+        fires, piece_fires = fires_room(), fires_room()
         B1 = B_at(S[V_P], par)
         y_b = equilibrium(B1, par)
         for k in range(time.size - 1 if status == DONE else 0):
@@ -405,11 +408,12 @@ def _build(stamp: int) -> Callable[..., Any]:
                         Q_error = gain * Q_error_y + EPS * largest_Q
                         if keep_spikes:
                             more = most_spikes(piece, q[0] + size, most, par)
-                            spikes = grown(spikes, int(S[COUNT]) + more)
+                            if int(S[COUNT]) + more >= spikes.size:
+                                spikes = grown(spikes, int(S[COUNT]) + more)
                         run_piece(
                             t, s + u * h, piece, q, P, degree, piece_fires, Q_error,
-                            missed, swing, over, values[ORDER], par, S, spikes,
-                            keep_spikes, most,
+                            missed, swing, over, values[ORDER], par, S,
+                            borrowed(spikes), keep_spikes, most,
                         )  # fmt: skip
                         if S[TOO_FAST] != 0.0:
                             status = FAST

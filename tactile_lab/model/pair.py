@@ -10,6 +10,7 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import TAU_L, V_RESET, series_at, to_series
 from tactile_lab.model.node_a import DIVIDER, LAMBDA, TAU, V_T, B_at, V_P_at
+from tactile_lab.model.scratch import room_for
 from tactile_lab.model.tableau import (
     DIFFERENTIATE,
     NODES,
@@ -42,6 +43,7 @@ MOVED = 9
 by V_C1, by V_C2."""
 STEP = 13
 """Numbers of a step."""
+series_room = room_for(ORDER + 1)
 
 
 @inner
@@ -184,7 +186,7 @@ def collocate_pair(
 @inner
 def series_of(start: float, W: FloatArray, first: int, a: FloatArray) -> None:
     """Series of start + W[first:first + ORDER], its last digits kept."""
-    part = np.empty(ORDER + 1)
+    part = series_room()
     part[0] = 0.0
     for i in range(ORDER):
         part[i + 1] = W[first + i]

@@ -20,6 +20,7 @@ from tactile_lab.errors import SolverError
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import T_EPS, TAU_L, V_FIRE, V_RESET, Q_at
 from tactile_lab.model.node_a import LAMBDA, PER_VOLT, TAU, V_T, B_at, V_P_at, slope_at
+from tactile_lab.model.scratch import borrowed
 from tactile_lab.model.solver import MOST_SPIKES
 from tactile_lab.model.spiking import grown
 from tactile_lab.validation.problem import Answer, Problem
@@ -79,6 +80,7 @@ def _build(stamp: int) -> Callable[..., Any]:
         segments: FloatArray, y: float, v: float, par: FloatArray, dt: float
     ) -> tuple[int, FloatArray, float, int]:
         _ = stamp
+        par = borrowed(par)
         count = evaluations = 0
         spikes = np.empty(64)
         resume = -1.0

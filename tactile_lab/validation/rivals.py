@@ -19,6 +19,7 @@ from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import T_EPS, TAU_L, V_FIRE, V_RESET, Q_at, Q_gain
 from tactile_lab.model.node_a import LAMBDA, PER_VOLT, TAU, V_T, B_at, V_P_at, slope_at
 from tactile_lab.model.pair import flow
+from tactile_lab.model.scratch import borrowed, room_for
 from tactile_lab.model.spiking import grown
 from tactile_lab.model.transistor import FLOW, SATURATES
 from tactile_lab.validation.problem import Answer, OutOfTimeError, Problem, slopes
@@ -41,6 +42,8 @@ EULER, RK4 = 1, 4
 FINISHED, OUT_OF_EVALUATIONS, NO_NUMBER = range(3)
 EVALUATIONS_PER_SECOND = 4e6
 """What compiled code does at least, and `cap` is told by."""
+stages_room, dense_room, pair_room = room_for(8, 2), room_for(5, 2), room_for(2)
+flow_room, jacobian_room = room_for(FLOW), room_for(FLOW + 1)
 
 
 @inner
@@ -182,9 +185,10 @@ def _build_adaptive(stamp: int) -> Callable[..., Any]:
         _ = stamp
         status, count, evaluations = FINISHED, 0, 0
         spikes = np.empty(64)
-        k = np.zeros((8, 2))
-        dense = np.empty((5, 2))
-        error, both, J = np.empty(2), np.empty(FLOW), np.empty(FLOW + 1)
+        par, k, dense = borrowed(par), stages_room(), dense_room()
+        error, both, J = pair_room(), flow_room(), jacobian_room()
+        for i in range(8):
+            k[i, 0] = k[i, 1] = 0.0
         resume = -1.0
         h = 1e-4
         for n in range(segments.shape[0]):
@@ -262,8 +266,9 @@ def _build_fixed(stamp: int) -> Callable[..., Any]:
         _ = stamp
         count = evaluations = 0
         spikes = np.empty(64)
-        k = np.zeros((5, 2))
-        both = np.empty(FLOW)
+        par, k, both = borrowed(par), stages_room(), flow_room()
+        for i in range(8):
+            k[i, 0] = k[i, 1] = 0.0
         resume = -1.0
         for n in range(segments.shape[0]):
             t0, V0, p = segments[n, 0], segments[n, 2], segments[n, 3]
