@@ -18,9 +18,10 @@ import numpy as np
 from sim_backend.plant.pieces import Pieces, join
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
-from tactile_lab.model.advance import Outputs, State, advance, rest
+from tactile_lab.model.advance import State, advance, rest
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import rest_V_C2
+from tactile_lab.model.solution import Solution
 from tactile_lab.model.temperature import at_temperature, temperature
 from tactile_lab.waveform import Waveform
 
@@ -70,7 +71,7 @@ class _Chunk:
     state: State
     end: float
     spacing: float
-    outputs: Outputs
+    solved: Solution
     circuit: Circuit
     fired: int
     pieces: dict[tuple[str, int], Pieces] = field(default_factory=dict)
@@ -155,7 +156,9 @@ class SimulatedSensor:
                 self._frontier, self._fired = chunk.state, chunk.fired
                 if chunk.start < time:
                     chunk.end = time
-                    self._frontier = self._advance(chunk.circuit, chunk.state, time)[0]
+                    self._frontier = self._advance(
+                        chunk.circuit, chunk.state, time
+                    ).after
                 return
         raise ParameterError(f"A command at {time:g} s lies before what is kept.")
 
@@ -182,10 +185,8 @@ class SimulatedSensor:
         """Times of the spikes in [start, end), s; none from before what is kept."""
         found = []
         for chunk in self._chunks:
-            times = chunk.outputs.spike_times
-            if times is None or chunk.end <= start or chunk.start >= end:
-                continue
-            if times.size:
+            times = chunk.solved.spike_times
+            if chunk.end > start and chunk.start < end and times.size:
                 found.append(times[(times >= start) & (times < min(end, chunk.end))])
         return np.concatenate(found) if found else np.empty(0)
 
@@ -221,20 +222,20 @@ class SimulatedSensor:
             state = state._replace(V_C2=circuit.reset_voltage, resume=None)
         if self._V_fire is not None or self._warmer is not None:
             end = min(end, state.time + LONGEST_NOISY)
-        after, outputs = self._advance(circuit, state, end)
+        solved = self._advance(circuit, state, end)
         spacing = FINE if calm < LIVELY else COARSE
-        chunk = _Chunk(state, end, spacing, outputs, circuit, self._fired)
+        chunk = _Chunk(state, end, spacing, solved, circuit, self._fired)
         self._chunks.append(chunk)
         cut = min(self._drive.next_command(state.time), self._next_change(state.time))
-        spikes = outputs.spike_times
-        if self._V_fire is not None and spikes is not None and spikes.size:
+        spikes = solved.spike_times
+        if self._V_fire is not None and spikes.size:
             one = float(spikes[0]) + JUST
             self._fired += one <= cut
             cut = min(cut, one)
         if cut < end:
             chunk.end = cut
-            after = self._advance(circuit, state, cut)[0]
-        self._frontier = after
+            solved = self._advance(circuit, state, cut)
+        self._frontier = solved.after
 
     def _changed(self, time: float) -> tuple[float, Circuit]:
         """The circuit at `time` s, and since when it has been that."""
@@ -256,39 +257,36 @@ class SimulatedSensor:
         volts = self._V_fire(self._fired, fire, reset)
         return replace(circuit, V_fire=volts, V_reset=reset)
 
-    def _advance(
-        self, circuit: Circuit, state: State, until: float
-    ) -> tuple[State, Outputs]:
+    def _advance(self, circuit: Circuit, state: State, until: float) -> Solution:
         force = self._drive.force(state.time, until)
         keep = self._keep or ("V_C1",)
-        after, outputs = advance(circuit, state, force, until, keep=keep)
-        solved = outputs.solution
+        solved = advance(circuit, state, force, until, keep=keep)
         self.error_V_C1 = max(self.error_V_C1, solved.error_V_C1)
         self.error_spike_time = max(self.error_spike_time, solved.error_spike_time)
-        return after, outputs
+        return solved
 
     def _of(self, chunk: _Chunk, signal: str, window: int) -> Pieces:
         key = signal, window
         if key not in chunk.pieces:
             low = chunk.start + window * WINDOW
-            high = min(chunk.start + (window + 1) * WINDOW, chunk.outputs.end)
+            high = min(chunk.start + (window + 1) * WINDOW, chunk.solved.end)
             chunk.pieces[key] = self._sampled(chunk, signal, low, high)
         return chunk.pieces[key]
 
     def _sampled(self, chunk: _Chunk, signal: str, low: float, high: float) -> Pieces:
         """Straight lines between samples, and both sides of each reset of V_C2."""
-        outputs = chunk.outputs
+        solved = chunk.solved
         count = max(1, round((high - low) / chunk.spacing))
         time = np.linspace(low, high, count + 1)
         if signal != "V_C2":
-            return Pieces.through(time, outputs.sample(signal, time))
-        spikes = outputs.solution.spike_times
+            return Pieces.through(time, solved.sample(signal, time))
+        spikes = solved.spike_times
         resets = spikes + self.circuit.reset_time
         if chunk.state.resume is not None:
             resets = np.concatenate([[chunk.state.resume], resets])
         resets = resets[(resets > low) & (resets <= high)]
         spikes = spikes[(spikes > low) & (spikes <= high)]
         time = np.sort(np.concatenate([time, spikes, resets, resets]))
-        value = outputs.sample(signal, time)
+        value = solved.sample(signal, time)
         value[np.searchsorted(time, resets, side="left")] = chunk.circuit.fire_voltage
         return Pieces.through(time, value)

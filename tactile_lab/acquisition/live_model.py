@@ -7,8 +7,9 @@ from queue import Empty, SimpleQueue
 import numpy as np
 
 from tactile_lab.magnetics import Magnet
-from tactile_lab.model.advance import Outputs, advance, rest
+from tactile_lab.model.advance import advance, rest
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.solution import Solution
 from tactile_lab.model.state import State
 from tactile_lab.scene.scene import Scene
 from tactile_lab.waveform import Waveform
@@ -62,7 +63,7 @@ class LiveModel:
             self._points.put((at, amperes))
             self._told = amperes
 
-    def until(self, end: float) -> Outputs:
+    def until(self, end: float) -> Solution:
         """Advance to `end` s, at least `reached`.
 
         Raises:
@@ -86,10 +87,11 @@ class LiveModel:
             amperes.append(amperes[-1])
         current = Waveform(np.array(times), np.array(amperes))
         force, self._field = self._magnet.lagged_force(current, self._field)
-        self._state, out = advance(
+        solved = advance(
             self._circuit, self._state, force, end, keep=KEEP, tolerance=TOLERANCE
         )
-        return out
+        self._state = solved.after
+        return solved
 
     def _next(self, end: float) -> tuple[float, float] | None:
         """The next set-point applied by `end` s; a later one waits for its turn."""

@@ -57,8 +57,7 @@ class ModelComparison:
             inside = (time >= begin) & (time <= end)
             told = []
             if self._searched:
-                spikes = out.spike_times
-                told.append(self._spikes(outcome, spikes))
+                told.append(self._spikes(outcome, out.spike_times))
             if inside.any():
                 predicted = out.sample("V_C1", time[inside])
                 off = trace[inside, 1] - predicted
@@ -73,10 +72,9 @@ class ModelComparison:
             return ""
         return f"{trial.label}: measured less model: {', '.join(told)}"
 
-    def _spikes(self, outcome: Outcome, spikes: FloatArray | None) -> str:
+    def _spikes(self, outcome: Outcome, spikes: FloatArray) -> str:
         start, length = outcome.start, outcome.trial.length
-        predicted = np.empty(0) if spikes is None else spikes
-        mine = predicted[(predicted >= start) & (predicted < start + length)] - start
+        mine = spikes[(spikes >= start) & (spikes < start + length)] - start
         count = outcome.spike_times.size
         text = f"{count} spike{'' if count == 1 else 's'} (model {mine.size})"
         offsets = match(outcome.spike_times, mine).offsets

@@ -39,8 +39,7 @@ def live_part(model: LiveModel, end: float) -> ModelPart | None:
     for signal in ("V_C1", "V_C2"):
         value = out.sample(signal, grid)
         bins[signal] = Trace.bins(grid, value, value, value, (end - begin) / count)
-    spikes = np.empty(0) if out.spike_times is None else out.spike_times
-    return ModelPart(bins, spikes, end)
+    return ModelPart(bins, out.spike_times, end)
 
 
 class StoredParts:

@@ -16,7 +16,7 @@ from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
-    from tactile_lab.model.advance import Outputs
+    from tactile_lab.model.solution import Solution
     from tactile_lab.model.state import State
 
 TRACE_POINTS = 2000
@@ -58,7 +58,7 @@ class ModelAlong:
         self.steps: list[Step] = []
         self._states: dict[tuple[Any, ...], list[State]] = {}
 
-    def during(self, index: int, keep: tuple[str, ...]) -> Outputs:
+    def during(self, index: int, keep: tuple[str, ...]) -> Solution:
         """What the model does in a step, at times of the run.
 
         Raises:
@@ -81,7 +81,7 @@ class ModelAlong:
             step, before = self.steps[at], known[at]
             # lists load between two steps, where the force stays as it was
             held = Waveform.constant(before.force)
-            state, found = advance(
+            found = advance(
                 circuit,
                 before,
                 joined([(before.time, held), (step.start, step.force)]),
@@ -90,7 +90,7 @@ class ModelAlong:
                 tolerance=DEFAULT_TOLERANCE,
             )
             if at + 1 == len(known):
-                known.append(state)
+                known.append(found.after)
             if at == index:
                 return found
 
@@ -124,7 +124,7 @@ class ModelOutcome(Outcome):
                 f"protocol {scene.protocol.name} looks at spikes, but neither "
                 'records them nor declares needs = ("spikes",).'
             )
-        spikes = self._found("spikes").solution.spike_times
+        spikes = self._found("spikes").spike_times
         end = self.start + self.trial.length
         return spikes[(spikes >= self.start) & (spikes < end)] - self.start
 
@@ -160,7 +160,7 @@ class ModelOutcome(Outcome):
         recorded = self._model.scene.record.signals
         return tuple(name for name in signals if name in recorded)
 
-    def _found(self, *keep: str) -> Outputs:
+    def _found(self, *keep: str) -> Solution:
         object.__setattr__(self, "looked_at", True)
         return self._model.during(self.index, keep)
 

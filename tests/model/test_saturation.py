@@ -165,8 +165,9 @@ def test_any_slicing_gives_the_same_spikes_and_state(circuit, cuts):
     state, spikes = rest(circuit), []
     for until in [*sorted(cuts), 0.4]:
         state = pickle.loads(pickle.dumps(state))
-        state, outputs = advance(circuit, state, FORCE, until, tolerance=1e-11)
-        spikes.extend(outputs.spike_times)
+        solved = advance(circuit, state, FORCE, until, tolerance=1e-11)
+        state = solved.after
+        spikes.extend(solved.spike_times)
     assert len(spikes) == whole.spike_times.size == state.spikes > 0
     assert np.max(np.abs(np.array(spikes) - whole.spike_times)) < 1e-12
     assert abs(state.V_C1 - whole.end.V_C1) < 1e-11

@@ -31,8 +31,9 @@ def sliced(circuit, cuts, end, known_until_now=False, through_pickle=False):
             ) if until in FORCE.time else FORCE  # fmt: skip
         if through_pickle:
             state = pickle.loads(pickle.dumps(state))
-        state, outputs = advance(circuit, state, force, until)
-        spikes.extend(outputs.spike_times)
+        solved = advance(circuit, state, force, until)
+        state = solved.after
+        spikes.extend(solved.spike_times)
     return state, np.array(spikes)
 
 
@@ -69,9 +70,9 @@ def test_what_is_known_later_does_not_matter_now():
 
 def test_a_jump_counts_once_whatever_slice_it_falls_into():
     force = Waveform.through([(0, 0), (0.5, 0), (0.5, 0.1), (1, 0.1)])
-    state, _ = advance(Circuit(), rest(Circuit()), force, 0.5)
+    state = advance(Circuit(), rest(Circuit()), force, 0.5).after
     assert state.V_P == pytest.approx(0.1 * Circuit().k_F)
-    again, _ = advance(Circuit(), state, force, 0.5)
+    again = advance(Circuit(), state, force, 0.5).after
     assert again.V_P == state.V_P
 
 
@@ -80,16 +81,16 @@ def test_slices_sample_as_the_whole_does():
     keep = ("V_C1", "V_C2", "V_K", "rate", "I_C", "V_P")
     circuit = Circuit(firing="put")
     whole = simulate(circuit, FORCE, until=1.2, keep=keep)
-    before, _ = advance(circuit, rest(circuit), FORCE, 0.3, keep=keep)
-    _, outputs = advance(circuit, before, FORCE, 0.9, keep=keep)
+    before = advance(circuit, rest(circuit), FORCE, 0.3, keep=keep).after
+    solved = advance(circuit, before, FORCE, 0.9, keep=keep)
     for signal in keep:
         scale = np.max(np.abs(whole.sample(signal, times)))
-        gap = np.abs(outputs.sample(signal, times) - whole.sample(signal, times))
+        gap = np.abs(solved.sample(signal, times) - whole.sample(signal, times))
         assert np.max(gap) < 1e-8 * scale, signal
 
 
 def test_a_state_without_v_c2_cannot_go_on_with_it():
-    state, _ = advance(Circuit(), rest(Circuit()), FORCE, 0.5, keep=("V_C1",))
+    state = advance(Circuit(), rest(Circuit()), FORCE, 0.5, keep=("V_C1",)).after
     with pytest.raises(ParameterError, match="same signals"):
         advance(Circuit(), state, FORCE, 0.6)
 
