@@ -6,6 +6,7 @@ buttons their space bar.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -47,18 +48,26 @@ class Shortcut:
     """One shortcut.
 
     Attributes:
-        keys: as written for `QKeySequence`.
+        written: its keys as `QKeySequence` has them, a space between two.
         words: what it does, for the list.
         act: does it.
-        single: a key without Ctrl: text fields and buttons come first.
         repeats: acts again and again while it is held down.
     """
 
-    keys: tuple[str, ...]
+    written: str
     words: str
     act: Callable[[], object]
-    single: bool = False
     repeats: bool = False
+
+    @property
+    def keys(self) -> list[str]:
+        """Each of its keys."""
+        return self.written.split()
+
+    @property
+    def single(self) -> bool:
+        """Whether it has neither Ctrl nor F1 to F12: fields and buttons come first."""
+        return re.match(r"Ctrl\+|(Shift\+)?F\d", self.written) is None
 
 
 class Actions(QObject):
@@ -141,126 +150,69 @@ class Actions(QObject):
         cross = panels.centre.stack.scene.toggle_crosshair
         form, stepped = panels.setup.form, panels.review.spikes.stepped.emit
         return [
-            Shortcut(("Ctrl+R",), "Run", panels.setup.start),
+            Shortcut("Ctrl+R", "Run", panels.setup.start),
+            Shortcut("Ctrl+Return", "Queue; save a queued run", panels.setup.enqueue),
             Shortcut(
-                ("Ctrl+Return",), "Queue; save a queued run", panels.setup.enqueue
+                "Ctrl+Shift+Return", "Start the queue", panels.session.queue.resume
             ),
+            Shortcut("Space", "Freeze the display", tools.freeze.click),
+            Shortcut("F", "Follow", tools.follow.click),
+            Shortcut("A", "Fit the whole run", view.show_all),
+            Shortcut("Z", "Zoom to a box", tools.zoom.click),
+            Shortcut("C", "Cursors", tools.cursors.click),
+            Shortcut("1", "Grab cursor A", lambda: self._grab(0)),
+            Shortcut("2", "Grab cursor B", lambda: self._grab(1)),
+            Shortcut("M", "Model", tools.twin.click),
+            Shortcut("Shift+M", "Residual", tools.residual.click),
+            Shortcut("+ =", "Zoom in", lambda: view.zoom(1.5), repeats=True),
+            Shortcut("-", "Zoom out", lambda: view.zoom(1 / 1.5), repeats=True),
+            Shortcut("Backspace", "The view before", view.back, repeats=True),
+            Shortcut("Shift+Backspace", "Forward again", view.forward, repeats=True),
+            Shortcut("X", "Crosshair", cross),
+            Shortcut("L", "Choose lanes", tools.lanes.click),
+            Shortcut("Left", "Earlier", lambda: self._nudge(-1), repeats=True),
+            Shortcut("Right", "Later", lambda: self._nudge(1), repeats=True),
+            Shortcut(".", "Next spike", lambda: stepped(1), repeats=True),
+            Shortcut(",", "The spike before", lambda: stepped(-1), repeats=True),
+            Shortcut("Ctrl+M", "Monitor the sensor", tools.monitor.click),
+            Shortcut("Home", "Start of the run", self._home),
+            Shortcut("End", "End of the run", lambda: view.set_follow(True)),
+            Shortcut("N", "Note", panels.centre.write_note),
+            Shortcut("Ctrl+N", "Note, from a field", panels.centre.write_note),
+            Shortcut("Ctrl+O", "Open a scene", self.screen.ask_scene),
+            Shortcut("Ctrl+Shift+O", "Open a run", self.screen.ask_run),
+            Shortcut("Ctrl+K", "Connect instruments", self.connect_dialog),
+            Shortcut("Ctrl+,", "Settings", self.show_preferences),
+            Shortcut("Ctrl+Q", "Quit", self.window.close),
+            Shortcut("Ctrl+S", "Save the scene", lambda: self.save_scene()),
+            Shortcut("Ctrl+E", "Export the view", lambda: self.export_view()),
+            Shortcut("Ctrl+F", "Search runs", self._search),
+            Shortcut("Ctrl+I", "About the run: notes", self.runs.about_shown),
+            Shortcut("F5", "Read the runs anew", self.screen.list_runs),
+            Shortcut("Ctrl+1", "Results", lambda: self._tab(0)),
+            Shortcut("Ctrl+2", "Runs", lambda: self._tab(1)),
+            Shortcut("Ctrl+3", "Manual", lambda: self._tab(2)),
+            Shortcut("Ctrl+4", "Spikes", lambda: self._tab(3)),
+            Shortcut("Ctrl+Z", "Undo in the form", form.edits.undo, repeats=True),
             Shortcut(
-                ("Ctrl+Shift+Return",), "Start the queue", panels.session.queue.resume
+                "Ctrl+Y Ctrl+Shift+Z", "Redo in the form", form.edits.redo, repeats=True
             ),
-            Shortcut(("Space",), "Freeze the display", tools.freeze.click, single=True),
-            Shortcut(("F",), "Follow", tools.follow.click, single=True),
-            Shortcut(("A",), "Fit the whole run", view.show_all, single=True),
-            Shortcut(("Z",), "Zoom to a box", tools.zoom.click, single=True),
-            Shortcut(("C",), "Cursors", tools.cursors.click, single=True),
-            Shortcut(("1",), "Grab cursor A", lambda: self._grab(0), single=True),
-            Shortcut(("2",), "Grab cursor B", lambda: self._grab(1), single=True),
-            Shortcut(("M",), "Model", tools.twin.click, single=True),
-            Shortcut(("Shift+M",), "Residual", tools.residual.click, single=True),
+            Shortcut("Return Enter", "Press the button that has the keyboard", _press),
+            Shortcut("F7", "Fold the left panel", lambda: self._fold(panels.setup)),
+            Shortcut("F8", "Fold the right panel", lambda: self._fold(panels.review)),
+            Shortcut("F6", "The next panel", lambda: self._enter(True)),
+            Shortcut("Shift+F6", "The panel before", lambda: self._enter(False)),
+            Shortcut("PgUp", "Scroll up", lambda: self._scroll(-1), repeats=True),
+            Shortcut("PgDown", "Scroll down", lambda: self._scroll(1), repeats=True),
+            Shortcut("F10", "Menu", self.show_menu),
+            Shortcut("Shift+F10", "Menu of what has the keyboard", _ask_menu),
+            Shortcut("F11", "Lanes only", self._focus),
+            Shortcut("Ctrl+L", "Lanes in a window of their own", self.lanes_asked.emit),
+            Shortcut("Ctrl+Shift+C", "Copy a picture", self.copy_picture),
             Shortcut(
-                ("+", "="), "Zoom in", lambda: view.zoom(1.5), single=True, repeats=True
-            ),
-            Shortcut(
-                ("-",),
-                "Zoom out",
-                lambda: view.zoom(1 / 1.5),
-                single=True,
-                repeats=True,
-            ),
-            Shortcut(
-                ("Backspace",), "The view before", view.back, single=True, repeats=True
-            ),
-            Shortcut(
-                ("Shift+Backspace",),
-                "Forward again",
-                view.forward,
-                single=True,
-                repeats=True,
-            ),
-            Shortcut(("X",), "Crosshair", cross, single=True),
-            Shortcut(("L",), "Choose lanes", tools.lanes.click, single=True),
-            Shortcut(
-                ("Left",), "Earlier", lambda: self._nudge(-1), single=True, repeats=True
-            ),
-            Shortcut(
-                ("Right",), "Later", lambda: self._nudge(1), single=True, repeats=True
-            ),
-            Shortcut(
-                (".",), "Next spike", lambda: stepped(1), single=True, repeats=True
-            ),
-            Shortcut(
-                (",",),
-                "The spike before",
-                lambda: stepped(-1),
-                single=True,
-                repeats=True,
-            ),
-            Shortcut(("Ctrl+M",), "Monitor the sensor", tools.monitor.click),
-            Shortcut(("Home",), "Start of the run", self._home, single=True),
-            Shortcut(
-                ("End",), "End of the run", lambda: view.set_follow(True), single=True
-            ),
-            Shortcut(("N",), "Note", panels.centre.write_note, single=True),
-            Shortcut(("Ctrl+N",), "Note, from a field", panels.centre.write_note),
-            Shortcut(("Ctrl+O",), "Open a scene", self.screen.ask_scene),
-            Shortcut(("Ctrl+Shift+O",), "Open a run", self.screen.ask_run),
-            Shortcut(("Ctrl+K",), "Connect instruments", self.connect_dialog),
-            Shortcut(("Ctrl+,",), "Settings", self.show_preferences),
-            Shortcut(("Ctrl+Q",), "Quit", self.window.close),
-            Shortcut(("Ctrl+S",), "Save the scene", lambda: self.save_scene()),
-            Shortcut(("Ctrl+E",), "Export the view", lambda: self.export_view()),
-            Shortcut(("Ctrl+F",), "Search runs", self._search),
-            Shortcut(("Ctrl+I",), "About the run: notes", self.runs.about_shown),
-            Shortcut(("F5",), "Read the runs anew", self.screen.list_runs),
-            Shortcut(("Ctrl+1",), "Results", lambda: self._tab(0)),
-            Shortcut(("Ctrl+2",), "Runs", lambda: self._tab(1)),
-            Shortcut(("Ctrl+3",), "Manual", lambda: self._tab(2)),
-            Shortcut(("Ctrl+4",), "Spikes", lambda: self._tab(3)),
-            Shortcut(("Ctrl+Z",), "Undo in the form", form.edits.undo, repeats=True),
-            Shortcut(
-                ("Ctrl+Y", "Ctrl+Shift+Z"),
-                "Redo in the form",
-                form.edits.redo,
-                repeats=True,
-            ),
-            Shortcut(
-                ("Return", "Enter"),
-                "Press the button that has the keyboard",
-                _press,
-                single=True,
-            ),
-            Shortcut(("F7",), "Fold the left panel", lambda: self._fold(panels.setup)),
-            Shortcut(
-                ("F8",), "Fold the right panel", lambda: self._fold(panels.review)
-            ),
-            Shortcut(("F6",), "The next panel", lambda: self._enter(True)),
-            Shortcut(("Shift+F6",), "The panel before", lambda: self._enter(False)),
-            Shortcut(
-                ("PgUp",),
-                "Scroll up",
-                lambda: self._scroll(-1),
-                single=True,
-                repeats=True,
-            ),
-            Shortcut(
-                ("PgDown",),
-                "Scroll down",
-                lambda: self._scroll(1),
-                single=True,
-                repeats=True,
-            ),
-            Shortcut(("F10",), "Menu", self.show_menu),
-            Shortcut(("Shift+F10",), "Menu of what has the keyboard", _ask_menu),
-            Shortcut(("F11",), "Lanes only", self._focus),
-            Shortcut(
-                ("Ctrl+L",), "Lanes in a window of their own", self.lanes_asked.emit
-            ),
-            Shortcut(("Ctrl+Shift+C",), "Copy a picture", self.copy_picture),
-            Shortcut(
-                ("?", "F1"),
+                "? F1",
                 "Help on the panel that has the keyboard, and shortcuts",
                 self._help_here,
-                single=True,
             ),
         ]
 
