@@ -45,11 +45,6 @@ class LiveBins:
         return tuple(channel.signal for channel in self._channels)
 
     @property
-    def written(self) -> int:
-        """Bins written so far; grows by one per bin and never falls."""
-        return self._levels[0].count if self._levels else 0
-
-    @property
     def reach(self) -> float:
         """Run time up to which there are bins, s; 0 before any."""
         return self._next_time

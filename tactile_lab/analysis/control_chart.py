@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
 
 WIDTH = 2.66
@@ -23,17 +22,15 @@ RUN = 8
 
 @dataclass(frozen=True, eq=False)
 class ControlChart:
-    """Values in order of time, what is usual, and which are not.
+    """What is usual of values in order of time, and which are not.
 
     Attributes:
-        values: shape (n,).
         mean: of all of them.
         low, high: limits.
         outside: indices of values beyond them.
         drifting: indices of values that end eight or more on one side of the mean.
     """
 
-    values: FloatArray
     mean: float
     low: float
     high: float
@@ -62,7 +59,6 @@ def control_chart(values: ArrayLike) -> ControlChart:
             drifting.append(i)
     beyond = np.flatnonzero(np.abs(found - mean) > reach)
     return ControlChart(
-        found,
         mean,
         mean - reach,
         mean + reach,

@@ -31,17 +31,12 @@ class Decay:
     Attributes:
         tau: leakage time constant, s; its interval is symmetric on the logarithm.
         amplitudes: of ln I_DS at the start of each hold.
-        scatter: standard deviation of I_DS about the fit, part of its mean.
         points: number of points used.
-        correlated: how many neighbouring points err alike, at least 1: the steps of a
-            converter do not average away like noise.
     """
 
     tau: Estimate
     amplitudes: tuple[Estimate, ...]
-    scatter: float
     points: int
-    correlated: float
 
 
 def fit_decay(
@@ -202,7 +197,5 @@ def _decay(theta: FloatArray, points: _Points) -> Decay:
             tau, tau * float(errors[0]), tau / float(factor), tau * float(factor)
         ),
         amplitudes=amplitudes,
-        scatter=scatter,
         points=int(points.t.size),
-        correlated=alike,
     )

@@ -114,17 +114,13 @@ class Line:
 
     Attributes:
         slope: with what the scatter about the line leaves open.
-        centre: (mean of x, mean of y), through which it goes.
         offset: y at x = 0, likewise.
         scatter: standard deviation of y about the line.
-        spread: sum of squares of x about its mean.
     """
 
     slope: Estimate
-    centre: tuple[float, float]
     offset: Estimate
     scatter: float
-    spread: float
 
     @classmethod
     def through(cls, x: FloatArray, y: FloatArray) -> Line:
@@ -145,10 +141,8 @@ class Line:
         error = scatter * math.sqrt(1 / x.size + middle**2 / spread)
         return cls(
             Estimate.of(slope, scatter / math.sqrt(spread), freedom),
-            (middle, mean),
             Estimate.of(offset, error, freedom),
             scatter,
-            spread,
         )
 
 

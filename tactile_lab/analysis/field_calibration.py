@@ -62,7 +62,6 @@ class FieldCalibration:
         half_width_current: the same along the current, A.
         slope: T/A.
         offset: of the straight line at 0 A, T.
-        residual: standard deviation of the mean curve about the line, T.
         drift: of the field at the same current and history from the begin to the end,
             T; None where no step was repeated.
         warming: of the winding meanwhile, K; None where it is not known. It has no
@@ -79,7 +78,6 @@ class FieldCalibration:
     half_width_current: Estimate
     slope: Estimate
     offset: Estimate
-    residual: float
     drift: Estimate | None
     warming: float | None
     uncertainty: float
@@ -151,7 +149,6 @@ def fit_field(
         half_width_current=loop.scaled(1 / abs(slope)),
         slope=line.slope,
         offset=line.offset,
-        residual=line.scatter,
         drift=drift,
         warming=warming,
         uncertainty=half_width + Z90 * _edge_error(noise, drift),

@@ -91,7 +91,6 @@ class RateLaw:
     Attributes:
         V_GS: V.
         scale: of V_P over what is believed: of the force, of g31.
-        scatter: standard deviation of V_C2 at firing about V_fire, V.
         intervals: number used.
         correlation: of the estimates of V_GS and scale.
         charging: of the believed circuit.
@@ -99,7 +98,6 @@ class RateLaw:
 
     V_GS: Estimate
     scale: Estimate
-    scatter: float
     intervals: int
     correlation: float
     charging: Charging
@@ -195,7 +193,7 @@ def fit_rate_law(
         for v, e in zip(theta, error, strict=True)
     )
     return RateLaw(
-        V_GS=V_GS, scale=scale, scatter=scatter, intervals=int(left.size),
+        V_GS=V_GS, scale=scale, intervals=int(left.size),
         correlation=float(half[0, 1] / max(error[0] * error[1], 1e-300)),
         charging=charging,
     )  # fmt: skip

@@ -87,11 +87,6 @@ class Recorder:
                 self._tick, CADENCE, when_full=when_full, capacity=capacity
             )
 
-    @property
-    def waiting(self) -> float:
-        """How full the queue is, 0 to 1."""
-        return 0.0 if self._queue is None else self._queue.fullness
-
     def segment(self, stream: Stream, start: float) -> None:
         """A stream starts; its first sample is at `start` s on the run's axis."""
         self._do(partial(self._segment, stream, start))

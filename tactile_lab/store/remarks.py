@@ -56,11 +56,6 @@ class Remarks:
     starred: bool = False
     notes: Sequence[Note] = ()
 
-    @property
-    def words(self) -> str:
-        """All texts, for a search."""
-        return " ".join((self.title, *self.tags, *(note.text for note in self.notes)))
-
 
 def read_remarks(path: Path) -> Remarks:
     """Remarks on the run in folder `path`; notes of older runs stand in their log.

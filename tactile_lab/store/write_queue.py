@@ -46,11 +46,6 @@ class WriteQueue:
         self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
         self._thread.start()
 
-    @property
-    def fullness(self) -> float:
-        """From 0 to 1."""
-        return self._bytes / self._capacity
-
     def put(self, write: Write, size: int) -> None:
         """Have `write` done, for which `size` bytes wait.
 

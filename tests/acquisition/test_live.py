@@ -73,7 +73,7 @@ def test_a_slow_reader_gets_the_newest_bins():
         live.add(Block(first, np.zeros((2, 1000), np.int16), (False, False), 0.0))
     bins = live.since(0, "V_C1")
     assert bins.time.size == CAPACITY
-    assert bins.time[-1] == pytest.approx((live.written - 1) * 1e-3)
+    assert bins.time[-1] == pytest.approx(live.reach - 1e-3)
 
 
 def test_part_of_the_record_is_found_by_time():
