@@ -27,7 +27,7 @@ from gui.banner import Banner
 from gui.dialogs.closing import Closing
 from gui.dialogs.overlay import Overlay
 from gui.look.theme import Theme
-from gui.menu import GearMenu, MenuActions
+from gui.menu import Act, GearMenu
 from gui.parts import IconButton
 from gui.preferences import Preferences
 from gui.run_actions import RunActions
@@ -374,20 +374,16 @@ class Actions(QObject):
 
     def show_menu(self) -> None:
         """Open the menu below its button."""
-        acts = MenuActions(
-            save_scene=self.save_scene,
-            about_run=self.runs.about_shown,
-            open_skin=self.ask_skin,
-            show_studies=self.show_studies,
-            export_view=self.export_view,
-            part_lanes=self.lanes_asked.emit,
-            connect=self.connect_dialog,
-            settings=self.show_preferences,
-            copy_command=self.copy_command,
-            help=self.show_help,
-            about=partial(self.show_help, page=2),
-            quit=self.window.close,
-        )
+        acts: dict[str, Act] = {}
+        for one in self.keys:
+            acts |= dict.fromkeys(one.keys, one.act)
+        acts |= {
+            "Open a skin …": self.ask_skin,
+            "Studies …": self.show_studies,
+            "Copy command line": self.copy_command,
+            "Help and shortcuts": self.show_help,
+            "About Tactile Lab": partial(self.show_help, page=2),
+        }
         recent = self.preferences.recent
         menu = GearMenu(self.window, self.panels, self.screen, recent, acts)
         menu.open_below(self.panels.header.menu_button)

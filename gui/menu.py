@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -21,24 +20,6 @@ RECENT = 8
 Act = Callable[[], object]
 
 
-@dataclass(frozen=True, kw_only=True)
-class MenuActions:
-    """What the menu asks of whoever opens it."""
-
-    save_scene: Act
-    about_run: Act
-    open_skin: Act
-    show_studies: Act
-    export_view: Act
-    part_lanes: Act
-    connect: Act
-    settings: Act
-    copy_command: Act
-    help: Act
-    about: Act
-    quit: Act
-
-
 class GearMenu(QMenu):
     """What can be asked of the whole window, with the keys that ask the same.
 
@@ -47,7 +28,7 @@ class GearMenu(QMenu):
         panels: of the window.
         screen: opens scenes and runs.
         recent: scenes opened last.
-        acts: the rest.
+        acts: what else is asked, by its keys, or by its words where it has none.
     """
 
     def __init__(
@@ -56,55 +37,55 @@ class GearMenu(QMenu):
         panels: Panels,
         screen: Screen,
         recent: list[Path],
-        acts: MenuActions,
+        acts: Mapping[str, Act],
     ) -> None:
         super().__init__(parent)
+        self._acts = acts
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         session, runs = panels.session, panels.review.runs
-        self._add("Open scene …", "Ctrl+O", screen.ask_scene)
+        self._add("Open scene …", "Ctrl+O")
         scenes = self.addMenu("Recent scenes")
         for path in recent:
             name = f"{path.stem}    {path.parent}"
             scenes.addAction(name, partial(screen.open_scene, str(path)))
         scenes.setEnabled(bool(recent))
-        self._add("Save scene …", "Ctrl+S", acts.save_scene)
-        self._add("Open run …", "Ctrl+Shift+O", screen.ask_run)
+        self._add("Save scene …", "Ctrl+S")
+        self._add("Open run …", "Ctrl+Shift+O")
         last, newest = self.addMenu("Recent runs"), runs.newest(RECENT)
         for entry in newest:
             name = f"{entry.title}    {day(entry.started)}    {entry.status}"
             last.addAction(name, partial(screen.open_run, entry.folder))
         last.setEnabled(bool(newest) and not session.state.in_run)
-        self._add("Open a skin …", "", acts.open_skin)
-        self._add("Studies …", "", acts.show_studies)
-        self._add("About this run …", "Ctrl+I", acts.about_run)
-        self._add("Export view …", "Ctrl+E", acts.export_view)
-        self._add("Lanes in a window of their own", "Ctrl+L", acts.part_lanes)
+        self._add("Open a skin …")
+        self._add("Studies …")
+        self._add("About this run …", "Ctrl+I")
+        self._add("Export view …", "Ctrl+E")
+        self._add("Lanes in a window of their own", "Ctrl+L")
         self.addSeparator()
         free = not session.busy and not session.monitor.alive
         use = partial(session.connect_bench, "sim")
-        self._add("Use simulated bench", "", use, possible=free)
-        self._add("Connect instruments …", "Ctrl+K", acts.connect)
-        leave = session.disconnect_bench
-        ready = session.state is WindowState.READY
-        self._add("Disconnect", "", leave, possible=free and ready)
+        self.addAction("Use simulated bench", use).setEnabled(free)
+        self._add("Connect instruments …", "Ctrl+K")
+        leave = self.addAction("Disconnect", session.disconnect_bench)
+        leave.setEnabled(free and session.state is WindowState.READY)
         self.addSeparator()
         theme = self.addMenu("Theme")
         for word in ("system", "light", "dark"):
             one = theme.addAction(word.capitalize(), partial(panels.theme.choose, word))
             one.setCheckable(True)
             one.setChecked(panels.theme.choice == word)
-        self._add("Settings …", "Ctrl+,", acts.settings)
+        self._add("Settings …", "Ctrl+,")
         self.addSeparator()
-        self._add("Copy command line", "", acts.copy_command)
-        self._add("Help and shortcuts", "?", acts.help)
-        self._add("About Tactile Lab", "", acts.about)
-        self._add("Quit", "Ctrl+Q", acts.quit)
+        self._add("Copy command line")
+        self._add("Help and shortcuts", "?")
+        self._add("About Tactile Lab")
+        self._add("Quit", "Ctrl+Q")
 
     def open_below(self, button: QWidget) -> None:
         """Open it below its button."""
         self.popup(button.mapToGlobal(QPoint(0, button.height())))
 
-    def _add(self, words: str, keys: str, act: Act, *, possible: bool = True) -> None:
+    def _add(self, words: str, keys: str = "") -> None:
         # a tab parts the keys; the window has the shortcuts, the menu only names them
-        made = self.addAction(f"{words}\t{keys}" if keys else words, act)
-        made.setEnabled(possible)
+        act = self._acts[words if words in self._acts else keys]
+        self.addAction(f"{words}\t{keys}" if keys else words, act)
