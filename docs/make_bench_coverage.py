@@ -23,6 +23,8 @@ from typing import Any
 from bench_coverage_cases import CASES, repeat
 from bench_coverage_page import table
 
+from tactile_lab.validation.table import commit
+
 DOCS = Path(__file__).parent
 PAGE = DOCS / "bench-coverage.md"
 KEPT = DOCS.parent / "runs" / "bench-coverage.jsonl"
@@ -63,7 +65,7 @@ def main() -> None:
     if given.since and git("cat-file", "-e", f"{given.since}^{{commit}}").returncode:
         asked.error(f"--since {given.since}: no commit of this repository")
     names = [n for n in CASES if any(w in n for w in given.words)] or list(CASES)
-    version = git("rev-parse", "--short", "HEAD").stdout.strip()
+    version = commit()
     done = {
         (r["case"], r["seed"])
         for r in kept(given.since)

@@ -7,7 +7,6 @@ number, that many repeats instead of 1000.
 from __future__ import annotations
 
 import datetime
-import subprocess
 import sys
 import tempfile
 import textwrap
@@ -34,6 +33,7 @@ from tactile_lab.model.simulate import simulate
 from tactile_lab.report.from_run import read
 from tactile_lab.report.identified import identify_run
 from tactile_lab.scene.load import load
+from tactile_lab.validation.table import commit
 from tactile_lab.waveform import Waveform
 
 DOCS = Path(__file__).parent
@@ -208,15 +208,11 @@ def main() -> None:
         values = ", ".join(f"{name} {value:g}" for name, value in truth.items())
         lines.append(f"| {title} | {values} | {shares} | {refused} | {each:.0f} ms |")
         print(lines[-1], file=sys.stderr, flush=True)
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        cwd=DOCS, capture_output=True, text=True, check=False,
-    ).stdout.strip()  # fmt: skip
     table, minute = "\n".join(lines), textwrap.fill(sixty_seconds(), 88)
     (DOCS / "fit-recovery.md").write_text(
         f"""# How often a 95 % interval holds the truth
 
-Written by `docs/make_fit_recovery.py` (part of `make reports`) at commit {commit},
+Written by `docs/make_fit_recovery.py` (part of `make reports`) at commit {commit()},
 {datetime.date.today().isoformat()}, {repeats} repeats with seeds 0 to {repeats - 1}.
 An honest interval holds it in 93 to 97 % of them.
 

@@ -18,6 +18,8 @@ import sys
 import time
 from pathlib import Path
 
+from tactile_lab.validation.table import commit, markdown
+
 ROOT = Path(__file__).parent.parent
 DONE = ROOT / "runs" / "reports.json"
 BENCHMARKS = "tests/benchmarks"
@@ -107,12 +109,6 @@ figures that is not listed is taken to measure everything."""
 HASH = r"\b(?=[0-9a-f]*[0-9])(?=[0-9a-f]*[a-f])[0-9a-f]{7}\b"
 
 
-def commit() -> str:
-    """Of the checkout; tables that were just written do not change it."""
-    asked = ["git", "rev-parse", "--short", "HEAD"]
-    return subprocess.check_output(asked, cwd=ROOT, text=True).strip()
-
-
 def since(version: str, paths: str) -> str:
     """How many commits after `version` changed any of these paths; "" if it is none."""
     asked = ["git", "rev-list", "--count", f"{version}..HEAD", "--", *paths.split()]
@@ -122,10 +118,7 @@ def since(version: str, paths: str) -> str:
 
 def pages() -> str:
     """Which page is of which commits, and what has changed since the oldest of them."""
-    lines = [
-        "| page | measured at | commits since to what it measures |",
-        "|---|---|---|",
-    ]
+    rows = []
     figures = (ROOT / "docs").glob("*-figures.md")
     whole = dict.fromkeys(sorted(page.stem for page in figures), ".")
     for name, paths in (whole | PAGES).items():
@@ -134,8 +127,9 @@ def pages() -> str:
         counts = {one: int(n) for one in found if (n := since(one, paths))}
         told = ", ".join(counts) or "not said"
         most = max(counts.values(), default=None)
-        lines.append(f"| {name} | {told} | {'unknown' if most is None else most} |")
-    return "\n".join(lines)
+        rows.append((name, told, "unknown" if most is None else str(most)))
+    heads = ("page", "measured at", "commits since to what it measures")
+    return markdown(heads, rows)
 
 
 def main() -> None:

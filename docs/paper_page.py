@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import datetime
 import math
-import subprocess
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from tactile_lab.analysis.adrian import ADRIAN
@@ -16,6 +14,7 @@ from tactile_lab.analysis.transfer import Transfer
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.quantity import plus_minus
+from tactile_lab.validation.table import commit, markdown
 
 
 def page(
@@ -45,10 +44,6 @@ def page(
         for s in rated["conclusion"]["slopes"]
     )
     twin = rated["twin"]
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        cwd=Path(__file__).parent, capture_output=True, text=True, check=False,
-    ).stdout.strip()  # fmt: skip
     critical = search["critical_force_N"] * 1e3
     printed, core = Magnet(r=6e-3), Magnet(r=6e-3, A2=2.25e-4)
     table_1 = Circuit()
@@ -56,9 +51,8 @@ def page(
     lasted = long["silent_from_s"] - fires
     highest = table_1.V_GS + table_1.k_F * 0.3
     warm = 330e-3 / table_1.m / math.log(10)
+    heads = ("paper", "its number", "ours", "difference", "why")
     rows = (
-        ("paper", "its number", "ours", "difference", "why"),
-        ("---",) * 5,
         (
             "Table 1", "23 values", "the same", "none",
             "A2 stands as printed, see below",
@@ -132,13 +126,13 @@ def page(
 
     return f"""# The paper's figures beside ours
 
-Written by `docs/make_paper.py` (part of `make reports`) at commit {commit},
+Written by `docs/make_paper.py` (part of `make reports`) at commit {commit()},
 {datetime.date.today().isoformat()}, from runs on the **simulated bench**: the same
 drivers, the same acquisition and the same detection as on hardware, but computed
 physics. Nothing here was measured on a device. Of the paper we have the text and its
 numbers, not its figures' data: where it prints no number, only the shape is compared.
 
-{table(rows)}
+{markdown(heads, rows)}
 
 ## Fig. 3: the circuit
 
@@ -266,8 +260,6 @@ fire the circuit) there are {long["spikes"]} spikes, the last
 throughout ({long["silent_from_s"]:.1f} s after the trial's start). How sharp that is,
 in the model alone:
 
-| V_GS off by | spikes in 60 s | the last, after the first |
-|---|---|---|
 {operating_points(trimmed)}
 
 Eq. (15) with V_P(t) misses the rates by {fig5b["conclusion"]["rms_Hz"] * 1e3:.2g} mHz
@@ -313,11 +305,6 @@ def last(values: Sequence[float | None]) -> float:
     return next(value for value in reversed(values) if value is not None)
 
 
-def table(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of a Markdown table."""
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
-
-
 def rates(results: dict[str, Any]) -> str:
     """Highest rate at each force."""
     return ", ".join(
@@ -338,13 +325,17 @@ def held(results: dict[str, Any]) -> str:
 
 
 def operating_points(trimmed: Sequence[Any]) -> str:
-    """Rows of the table of V_GS."""
-    return "\n".join(
-        f"| {t.off * 1e3:+.1f} mV | {t.spikes} | "
-        + ("fires also without force" if t.at_rest else f"{t.last:.1f} s")
-        + " |"
+    """How the last spike moves with V_GS, as a table."""
+    rows = [
+        (
+            f"{t.off * 1e3:+.1f} mV".replace("-", "−"),
+            str(t.spikes),
+            "fires also without force" if t.at_rest else f"{t.last:.1f} s",
+        )
         for t in trimmed
-    ).replace("-", "−")
+    ]
+    heads = ("V_GS off by", "spikes in 60 s", "the last, after the first")
+    return markdown(heads, rows)
 
 
 def spikes(results: dict[str, Any]) -> str:

@@ -16,15 +16,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def provenance() -> str:
-    """Commit, date, machine and how busy it is, for the head of a report."""
-    commit = subprocess.run(
+def commit() -> str:
+    """Of the checkout; "unknown" outside of one."""
+    said = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True,
         check=False, cwd=Path(__file__).parent,
     ).stdout.strip()  # fmt: skip
+    return said or "unknown"
+
+
+def provenance() -> str:
+    """Commit, date, machine and how busy it is, for the head of a report."""
     busy = f", load average {os.getloadavg()[0]:.0f}" if os.name == "posix" else ""
     return (
-        f"Commit {commit or 'unknown'}, {date.today().isoformat()}, "
+        f"Commit {commit()}, {date.today().isoformat()}, "
         f"{platform.machine()}, {os.cpu_count()} cores, "
         f"Python {platform.python_version()}, one thread{busy}."
     )

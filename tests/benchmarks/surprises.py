@@ -8,7 +8,6 @@ goes on where it was, at the same commit.
 
 import argparse
 import csv
-import subprocess
 import tempfile
 from datetime import date
 from pathlib import Path
@@ -19,6 +18,7 @@ from tactile_lab.engine.execution import Execution
 from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
 from tactile_lab.scene.load import load
+from tactile_lab.validation.table import commit
 
 SPANS = {
     "input_bias": (25e-12, 100e-12, "A"),
@@ -150,27 +150,21 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=SINGLE + NONE + TWO)
     asked = parser.parse_args()
     table = asked.out.with_name("surprises.csv")
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout.strip()
-    rows = []
+    version, rows = commit(), []
     if table.exists():
         with table.open(newline="", encoding="utf-8") as file:
-            rows = [r for r in csv.DictReader(file) if r["commit"] == commit]
+            rows = [r for r in csv.DictReader(file) if r["commit"] == version]
     done = {int(r["seed"]) for r in rows}
     with table.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, (*COLUMNS, "commit"))
         writer.writeheader()
         writer.writerows(rows)
         for seed in sorted(set(range(asked.seeds)) - done):
-            rows.append({k: str(v) for k, v in row(seed).items()} | {"commit": commit})
+            rows.append({k: str(v) for k, v in row(seed).items()} | {"commit": version})
             writer.writerow(rows[-1])
             file.flush()
             print(*(rows[-1][name] for name in COLUMNS), flush=True)
-    asked.out.write_text(page(rows, commit), encoding="utf-8")
+    asked.out.write_text(page(rows, version), encoding="utf-8")
 
 
 if __name__ == "__main__":
