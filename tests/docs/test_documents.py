@@ -169,6 +169,14 @@ def test_the_page_of_the_architecture_draws_the_layers_that_are_checked() -> Non
     assert "\n".join(layers) in page
 
 
+def test_all_places_that_the_page_of_the_architecture_names_are_there() -> None:
+    page = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    rooms = "tactile_lab|gui|drivers|sim_backend|protocols"
+    named = re.findall(rf"`((?:{rooms})/[\w/]*(?:\.py)?)`", page)
+    missing = [place for place in named if not (DOCS.parent / place).exists()]
+    assert len(named) > 40 and not missing
+
+
 def test_the_skin_of_its_page_is_pressed_and_its_python_runs(tmp_path, tactile_lab):
     (toml,) = blocks("skin.md", "toml")
     (tmp_path / "ball.toml").write_text(toml, encoding="utf-8")
