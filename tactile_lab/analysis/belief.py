@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from tactile_lab.analysis.estimate import Z95
 from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Followers
 from tactile_lab.deviation import Deviation, DrivenCircuit
@@ -22,6 +24,12 @@ NOWHERE = Deviation()
 """Nothing is other than believed."""
 STEADY = 1e-9
 """A force below this is none, N."""
+APART = 0.25
+"""Steps of the source further apart than this belong to no one ramp, s."""
+PROMPT = 5e-5
+"""A step that is known so well is where it is believed to be, s."""
+MOMENTS = 2
+"""So many of a ramp's steps are felt in what comes after them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +45,9 @@ class Belief:
         clock: how far measured times may lie from the current's, s.
         dated: whether the samples show when the current changed, so that its times are
             by the clock that measured times are by.
+        steps: shape (n, 2): from that time on, s, the source gives this current, A.
+        doubt: shape (n,): how far each of them may lie on either side of where the
+            others say, s.
         deviation: of all that, to be tried.
     """
 
@@ -47,6 +58,8 @@ class Belief:
     temperature: float | None = None
     clock: float = 0.0
     dated: bool = True
+    steps: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+    doubt: FloatArray = field(default_factory=lambda: np.empty(0))
     deviation: Deviation = NOWHERE
 
     @cached_property
@@ -118,6 +131,36 @@ class Belief:
         if later:
             force = force.shifted(later).since(0.0)
         return DrivenCircuit(circuit, force)
+
+    @cached_property
+    def scattered(self) -> FloatArray:
+        """What steps moved by themselves leave open, each row independent; (k, n), s.
+
+        Steps that follow each other closely, as in a ramp, are taken together: what
+        comes later feels little more of them than current times delay, in sum and in
+        its first moments. A row is half of the 95 % band of one of these, as the steps
+        most likely make it.
+        """
+        time, level = self.steps.T
+        change, half = np.diff(level, prepend=0.0), Z95 / math.sqrt(3) * self.doubt
+        ends = np.flatnonzero(np.diff(time) > APART) + 1
+        rows = []
+        for ramp in np.split(np.arange(time.size), ends):
+            ramp = ramp[half[ramp] > PROMPT]
+            since = time[ramp] - time[ramp].mean() if ramp.size else time[ramp]
+            felt = np.vander(since, min(MOMENTS, ramp.size), increasing=True)
+            for way in np.linalg.qr(felt * (change * half)[ramp, np.newaxis])[0].T:
+                row = np.zeros(time.size)
+                row[ramp] = half[ramp] * way
+                rows.append(row)
+        return np.array(rows).reshape(len(rows), time.size)
+
+    def shifted(self, later: FloatArray) -> Belief:
+        """With each step later by so much, shape (n,), s, but none before the last."""
+        time = np.maximum.accumulate(self.steps[:, 0] + later)
+        steps = np.column_stack([time, self.steps[:, 1]])
+        setpoint = Waveform.stairs(steps, float(self.setpoint.time[-1]))
+        return replace(self, setpoint=setpoint, steps=steps)
 
     def displaced(self, part: float = PART) -> Iterator[tuple[str, DrivenCircuit]]:
         """By each independent cause of uncertainty: moved by `part` of its band."""

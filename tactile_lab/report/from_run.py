@@ -115,6 +115,8 @@ def _belief(run: Run, scene: Scene) -> Belief | None:
         temperature=scene.sensor.temperature_uncertainty,
         clock=clock or 0.0,
         dated=applied.uncertainty() is not None,
+        steps=applied.steps,
+        doubt=applied.doubt,
     )
 
 

@@ -116,19 +116,27 @@ def _evidence(run: RunData, names: Sequence[str]) -> Evidence:
     if trace is not None:
         seen = measured(run, believed, trace)
         lag = LAG if believed.magnet.lag_uncertainty is None else 0.0
-        inside = settled(run.force, seen.time, believed.clock, lag)
+        known = believed.clock + float(believed.doubt.max(initial=0.0))
+        inside = settled(run.force, seen.time, known, lag)
         seen = replace(seen, time=seen.time[inside], value=seen.value[inside])
+
+    scattered = believed.scattered
+    # another run's answers were late at other steps
+    ramps = [f"answers of {run.run}, ramp {i}" for i in range(len(scattered))]
 
     def moved(circuit: Circuit, parts: Mapping[str, float]) -> DrivenCircuit:
         bands = np.array([parts.get(what, 0.0) for _, what, _ in believed.bands])
-        driven = replace(believed, circuit=circuit).moved(bands)
+        late = [parts.get(ramp, 0.0) for ramp in ramps]
+        placed = believed.shifted(late @ scattered) if any(late) else believed
+        driven = replace(placed, circuit=circuit).moved(bands)
         return _by_scope(
             driven, CLOCK_ERROR * parts[RATE], stretched=not believed.dated
         )
 
     # what is fitted is not held by what was believed of it
     fitted = {"input_bias"} if "I_bias" in names else set()
-    causes = [what for _, what, _ in believed.bands if what not in fitted] + [RATE]
+    causes = [what for _, what, _ in believed.bands if what not in fitted]
+    causes += [RATE, *ramps]
     return Evidence(
         believed.circuit,
         believed.force,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +30,8 @@ ENOUGH = 5
 MANY = 20
 """So many tell by their scatter how well each was seen."""
 BEFORE, AFTER = 0.06, 0.004
-"""An edge is looked for so long before and after the host heard of the step, s."""
+"""An edge is looked for so long before and after the host heard of the step, s, or from
+when it was sent, if that was earlier: an answer may be lost."""
 BIN_TIME = 5e-4
 """Bins of the shunt that edges are looked for in, s."""
 BACK = 0.25
@@ -56,6 +57,8 @@ class AppliedCurrent:
         away: shape (n,): how long before the first of those or after the last each
             step came, s; 0 between them.
         timing: half of the 95 % band to which the shunt dates them, s.
+        doubt: shape (n,): how far each step may lie on either side of where the others
+            say, s; 0 where the shunt tells.
     """
 
     steps: FloatArray
@@ -64,6 +67,7 @@ class AppliedCurrent:
     lead: float
     away: FloatArray
     timing: float = BIN_TIME
+    doubt: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def uncertainty(self, start: float = -np.inf, end: float = np.inf) -> float | None:
         """Half of the 95 % band of the steps' times against the samples, s.
@@ -88,6 +92,7 @@ def applied_current(
     shunt: Shunt | None = None,
     coil_lag: float = 0.0,
     listed: ArrayLike = False,
+    asked: ArrayLike = np.nan,
 ) -> AppliedCurrent:
     """Join what source and shunt tell.
 
@@ -101,6 +106,7 @@ def applied_current(
         listed: which of them the source took by its own clock, so that they came when
             `time` says: `BY_SAMPLES` where the shunt showed when their list began,
             `BY_HOST` where only the host told, else 0.
+        asked: when the host sent each, s; not a number where that is not known.
     """
     t, sent, read = (np.asarray(v, np.float64) for v in (time, setpoint, measured))
     if not t.size:
@@ -114,10 +120,14 @@ def applied_current(
     own_clock = dated > 0
     begin, ends = t[first].copy(), np.append(t[first][1:], t[-1])
     edges, lead, away, timing = 0, 0.0, np.zeros(begin.size), BIN_TIME
+    sent_at = np.broadcast_to(np.asarray(asked, np.float64), t.shape)[first].copy()
+    sent_at[0] = np.nan  # it stood when the run began, and was read back
+    doubt = _doubt(t[first] - np.where(own_clock, np.nan, sent_at))
     if shunt is not None:
         seen = np.full(begin.size, np.nan)
         for i in np.flatnonzero(~own_clock[1:]) + 1:
-            at = _edge(shunt, begin[i - 1], begin[i], level[i - 1], level[i])
+            since = max(begin[i - 1], np.fmin(begin[i] - BEFORE, sent_at[i]))
+            at = _edge(shunt, since, begin[i], level[i - 1], level[i])
             seen[i] = np.nan if at is None else at - math.log(2) * coil_lag
         shown = np.isfinite(seen)
         edges = int(shown.sum())
@@ -132,10 +142,28 @@ def applied_current(
             away[moved] = np.maximum(at[0] - t[first], t[first] - at[-1])[moved]
             away = np.maximum(away, 0.0)
         begin = np.maximum.accumulate(np.where(shown, seen, begin))
+        doubt[shown] = 0.0
+    begin = np.maximum.accumulate(begin - doubt)
     steps = np.column_stack([begin, level])
     by_host = bool(np.any(dated == BY_HOST))
     edges = 0 if by_host else edges + int(np.sum(dated == BY_SAMPLES))
-    return AppliedCurrent(steps, ends, edges, lead, away, timing)
+    return AppliedCurrent(steps, ends, edges, lead, away, timing, doubt)
+
+
+def _doubt(rounds: FloatArray) -> FloatArray:
+    """How far a step may lie on either side of where the others say, s; shape (n,).
+
+    By how much longer its round trip took than the quickest: either on the way there or
+    on the way back, which the host cannot tell apart.
+
+    Args:
+        rounds: from sending a set-point to hearing of it, s; not a number where that
+            is not known.
+    """
+    known = np.isfinite(rounds)
+    if not known.any():
+        return np.zeros(rounds.size)
+    return np.where(known, rounds - rounds[known].min(), 0.0) / 2
 
 
 def _timing(heard: FloatArray, early: FloatArray, coil_lag: float) -> float:
@@ -173,12 +201,12 @@ def _level(sent: float, read: FloatArray) -> float:
 
 
 def _edge(
-    shunt: Shunt, before: float, heard: float, old: float, new: float
+    shunt: Shunt, since: float, heard: float, old: float, new: float
 ) -> float | None:
     """When the shunt passed half the step to `new` A; None if it does not show it."""
     if abs(new - old) < VISIBLE:
         return None
-    time, value = shunt(max(heard - BEFORE, before), heard + AFTER)
+    time, value = shunt(since, heard + AFTER)
     if time.size < 3:
         return None
     done = (value - old) / (new - old)

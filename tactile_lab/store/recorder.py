@@ -129,13 +129,14 @@ class Recorder:
         ratio: float | None = None,
         *,
         listed: int = 0,
+        asked: float | None = None,
     ) -> None:
         """Store a set-point and its read-back, A, and the resistance over cold.
 
-        `listed`: as `tactile_lab.store.applied.applied_current` takes it.
+        `listed` and `asked`: as `tactile_lab.store.applied.applied_current` takes them.
         """
         known = _number(measured), _number(ratio)
-        self._add("current", time, setpoint, *known, listed)
+        self._add("current", time, setpoint, *known, listed, _number(asked))
 
     def field(self, time: float, field: float) -> None:
         """Store a teslameter reading, T."""

@@ -368,13 +368,15 @@ class StoredRun:
             SceneError: the run's scene cannot be read any more.
         """
         rows = self.current
+        columns = rows.dtype.names or ()  # older runs lack some
         return applied_current(
             rows["time"],
             rows["setpoint"],
             rows["measured"],
             self.shunt,
             self.scene.bench.magnet.coil_lag,
-            rows["listed"] if "listed" in (rows.dtype.names or ()) else False,
+            rows["listed"] if "listed" in columns else False,
+            rows["asked"] if "asked" in columns else np.nan,
         )
 
     @cached_property

@@ -45,6 +45,8 @@ def test_the_demo_finds_the_papers_spikes_and_loses_nothing(run_scene):
         assert len(run.signal("V_K")) >= 18e6
         assert run.spikes.size == sum(counts) == ran.done.spikes
         assert np.abs(run.current["setpoint"]).max() == pytest.approx(1.0, rel=0.02)
+        assert np.all(run.current["asked"] < run.current["time"])
+        assert run.applied.doubt == pytest.approx(0.0, abs=1e-9)
         assert run.current["measured"][-1] == pytest.approx(0.0, abs=5e-3)
 
 

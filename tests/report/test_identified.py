@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from modelled_runs import modelled, pulse
+from modelled_runs import MAGNET, modelled, pulse
 
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.report.findings import find
@@ -52,6 +52,33 @@ def test_tau_is_known_no_better_than_the_clock_it_is_measured_by(rate_force):
         tau = identify_run(run, ("tau",)).estimates["tau"]
         assert tau.low < 8.69 < tau.high
         assert tau.half < 1.1e-4 * 8.69
+
+
+def test_steps_that_came_by_themselves_earlier_or_later_are_in_the_interval():
+    """Ramps in steps of 45 ms, each answered up to 8 ms later than it might be."""
+    rng, scale = np.random.default_rng(0), MAGNET.newtons_per_ampere
+    up = np.linspace(0.0, 0.15, 7)[1:]
+    level = np.tile(np.concatenate([up, up[-2::-1], [0.0]]), 3) / scale
+    told = np.concatenate([0.2 + 0.045 * np.arange(6) + k for k in range(6)])
+    doubt = rng.uniform(0, 4e-3, told.size)
+    came, heard = (np.column_stack([at, level]) for at in (told - doubt, told))
+    force = Waveform.stairs(came, 6.5).scaled(scale)
+    run = modelled("pulses", [("", 0.15, force, False)], bins=600)
+    V_C1, (trial,) = run.traces[0], run.trials
+    mean = V_C1.mean + rng.normal(0, 5e-4, 600)
+    spikes = trial.spike_times + rng.normal(0, 1e-6, trial.spike_times.size)
+    believed = replace(
+        run.belief, setpoint=Waveform.stairs(heard, 6.5), clock=0.02, dated=False,
+        steps=heard, doubt=doubt,
+    )  # fmt: skip
+    seen = replace(trial, spike_times=spikes)
+    trace = replace(V_C1, mean=mean)
+    run = replace(run, traces=(trace,), trials=(seen,), belief=believed)
+    found = identify_run(run, ("V_GS", "tau")).estimates
+    for name, truth in (("V_GS", 1.4), ("tau", 8.69)):
+        assert found[name].low < truth < found[name].high
+    assert found["V_GS"].half < 5e-5
+    assert found["tau"].half < 5e-3
 
 
 def test_a_factor_of_the_force_is_not_held_by_what_was_believed_of_it():

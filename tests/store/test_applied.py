@@ -91,6 +91,30 @@ def test_without_a_shunt_the_host_s_times_stand():
     assert found.edges == 0
 
 
+def test_a_step_that_was_answered_late_may_have_come_earlier():
+    """Half of what its round trip took longer than the quickest, either way."""
+    time, sent, read = rows()
+    asked = time - 0.02
+    asked[:2] = time[:2] - 0.005  # the first is read back, which is no step
+    late = np.flatnonzero(sent == 1.0)[0]
+    time[late] += 0.01
+    found = applied_current(time, sent, read, asked=asked)
+    assert found.doubt == pytest.approx([0, 0, 0.005, 0], abs=1e-9)
+    assert found.steps[2, 0] == pytest.approx(CAME[2] + 0.03 + 0.005)
+
+
+def test_an_edge_is_looked_for_from_when_its_set_point_was_sent():
+    """Of which the first answer was lost."""
+    time, sent, read = rows()
+    asked = time - 0.035
+    late = np.flatnonzero(sent == 1.0)[0]
+    time[late] += 0.2
+    found = applied_current(time, sent, read, shunt(), asked=asked)
+    assert found.steps[2, 0] == pytest.approx(CAME[2], abs=1.5e-3)
+    assert found.edges == 3
+    assert not found.doubt.any()
+
+
 def test_a_wrong_shunt_shows_in_the_averages():
     seen = shunt(scale=0.1, noise=1e-4)
     found = applied_current(*rows(), seen)
