@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from pydantic.fields import FieldInfo
@@ -189,22 +189,18 @@ class Form(QWidget):
         Raises:
             FieldError: a field cannot be used.
         """
-        made = []
-        for value in self.values:
-            entry = value.entry()
-            if entry is not None:
-                made.append(f"{self._table}.{value.parameter.key}={entry}")
-        return made
+        return self._entries(self.values)
 
     def changes(self) -> list[str]:
         """As `overrides`, of what differs from what is usual."""
-        made = []
-        for value in self.values:
-            if value.is_changed and not value.problem:
-                entry = value.entry()
-                if entry is not None:
-                    made.append(f"{self._table}.{value.parameter.key}={entry}")
-        return made
+        changed = (v for v in self.values if v.is_changed and not v.problem)
+        return self._entries(changed)
+
+    def _entries(self, values: Iterable[FieldText]) -> list[str]:
+        found = ((value.parameter.key, value.entry()) for value in values)
+        return [
+            f"{self._table}.{key}={text}" for key, text in found if text is not None
+        ]
 
     def changed_texts(self) -> dict[str, str]:
         """What stands in the fields that differ from what is usual."""

@@ -111,6 +111,7 @@ class CoilThread(InstrumentThread):
         live: the output is on, as it was read back.
         loaded: the list that the source holds, or None.
         list: the list of this trial, playing or played, or None.
+        plays_list: whether it plays.
         generator: plays lists into the source's analogue input; None where it is not
             wired.
         skipped: set-points that came so late that the next was due by what the source
@@ -149,7 +150,7 @@ class CoilThread(InstrumentThread):
         self._start_list = False
         self._generated: CurrentList | None = None
         self.generator: GeneratorPlayer | None = None
-        self._playing = False
+        self.plays_list = False
         self._passed = 0
 
     @property
@@ -170,11 +171,6 @@ class CoilThread(InstrumentThread):
         self.source_late = False
         self._next = self.clock.now()
         self.clock.notify()
-
-    @property
-    def plays_list(self) -> bool:
-        """Whether a list plays."""
-        return self._playing
 
     def load_list(self, drive: Drive) -> None:
         """Ask for a drive's list to be loaded; it is once `loaded` is this one."""
@@ -225,7 +221,7 @@ class CoilThread(InstrumentThread):
                 self._begin_list(cast("ListCoil", self.coil))
             if self._generated is not None and self.generator is not None:
                 self._begin_generated(self._generated, self.generator)
-            if self.list is not None and self._playing:
+            if self.list is not None and self.plays_list:
                 self._watch(self.list, self.clock.now())
             now = self.clock.now()
             if self._waveform is not None and now >= self._next:
@@ -234,7 +230,7 @@ class CoilThread(InstrumentThread):
 
     def make_safe_and_close(self) -> None:
         """Switch off, verify by read-back, close."""
-        if self.generator is not None and self._playing:
+        if self.generator is not None and self.plays_list:
             self.generator.ramp_down(self.coil.beat)
         asked, last = self.clock.now(), self.last
         self.off = self.coil.safe_off()
@@ -298,7 +294,7 @@ class CoilThread(InstrumentThread):
             asked = self.clock.now()
             coil.start_list()
             self.list = PlayedList(self.loaded, asked, self.clock.now())
-            self._start_list, self._playing, self._passed = False, True, 0
+            self._start_list, self.plays_list, self._passed = False, True, 0
             self._read = asked
         self.clock.notify()
 
@@ -307,7 +303,7 @@ class CoilThread(InstrumentThread):
         coil = cast("AnalogueCoil", self.coil)
         self._generated = None
         coil.follow(points, player.grain)
-        self._playing = True
+        self.plays_list = True
         began = player.start(coil.beat)
         coil.followed_from(*began)
         self.list = PlayedList(points, *began, generated=True)
@@ -334,7 +330,7 @@ class CoilThread(InstrumentThread):
                 cast("GeneratorPlayer", self.generator).ended()
             else:
                 cast("ListCoil", coil).end_list()
-            self._playing = False
+            self.plays_list = False
             self._note(self._read_back(now, 0.0))
             self.clock.notify()
         elif now - self._read >= READ_BACK_PLAYED:

@@ -35,6 +35,15 @@ ERRORS = (1e-9, 1e-6)
 """True errors of spike times at which methods are compared, s."""
 
 
+JUMPS = (
+    (0.27, "V_C1 starts to collapse"),
+    (0.3, "V_C1 collapses"),
+    (0.4, "rate of V_C1 8e4 /s"),
+    (1.0, "rate of V_C1 7e7 /s"),
+)
+"""Forces reached at once, N, and what is hard about them."""
+
+
 def _four_pulses() -> Waveform:
     points = [(0.0, 0.0)]
     for k, level in enumerate((0.08, 0.12, 0.16, 0.2)):
@@ -63,21 +72,13 @@ def accuracy_scenes() -> tuple[Problem, ...]:
             Waveform.through([(0, 0), (5, 0), (5.01, 0.05), (105, 0.05)]),
             105.0, note="50 mN for 100 s, close to threshold",
         ),
-        Problem(
-            "jump270", table, Waveform.through([(0, 0), (0.5, 0), (0.5, 0.27)]), 2.5,
-            note="a jump to 270 mN, V_C1 starts to collapse",
-        ),
-        Problem(
-            "jump300", table, Waveform.through([(0, 0), (0.5, 0), (0.5, 0.3)]), 2.5,
-            note="a jump to 300 mN, V_C1 collapses",
-        ),
-        Problem(
-            "jump400", table, Waveform.through([(0, 0), (0.5, 0), (0.5, 0.4)]), 2.5,
-            note="a jump to 400 mN, rate of V_C1 8e4 /s",
-        ),
-        Problem(
-            "jump1000", table, Waveform.through([(0, 0), (0.5, 0), (0.5, 1.0)]), 2.5,
-            note="a jump to 1 N, rate of V_C1 7e7 /s",
+        *(
+            Problem(
+                f"jump{1000 * force:g}", table,
+                Waveform.through([(0, 0), (0.5, 0), (0.5, force)]), 2.5,
+                note=f"a jump to {show(force, 'N')}, {what}",
+            )
+            for force, what in JUMPS
         ),
         Problem(
             "put", Circuit(firing="put"),

@@ -23,11 +23,7 @@ from tactile_lab.whole_file import replacing
 
 PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 CHUNK = 1 << 18
-
-
-def size(run: Run, selection: Selection) -> int:
-    """Bytes the file will take, at most."""
-    return compressed_size(run, selection)
+size = compressed_size
 
 
 def export(

@@ -21,10 +21,7 @@ from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 from tactile_lab.whole_file import replacing
 
-
-def size(run: Run, selection: Selection) -> int:
-    """Bytes the files will take, at most."""
-    return compressed_size(run, selection)
+size = compressed_size
 
 
 def export(
