@@ -20,7 +20,7 @@ from tactile_lab.code_cache import kept
 
 F = TypeVar("F", bound=Callable[..., Any])
 COMPILED = (
-    "compiled.py", "tableau.py", "node_a.py", "integrator.py", "spiking.py",
+    "compiled.py", "tableau.py", "node_a.py", "integrator.py", "spiking.py", "train.py",
     "kernel.py", "sampling.py", "transistor.py", "pair.py", "coupled.py",
     "rest_pair.py", "truncation.py", "threshold.py", "ellipse.py", "derived.py",
     "packed.py", "batch.py", "taylor.py", "elementary.py", "matrix.py",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
+from tactile_lab.model import train
 from tactile_lab.model.circuit import LARGEST_VOLTAGE
 from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import (
@@ -83,7 +84,7 @@ FRESH[SHORTEST] = np.inf
 nodes_room, matrix_room = room_for(ROWS), room_for(ORDER, ORDER)
 series_room, points_room = room_for(ORDER + 1), room_for(3 * (ORDER + 1))
 q_room, P_room = room_for(ORDER + 2), room_for(2 * MOST_TERMS + 2)
-fires_room = room_for(4)
+fires_room, lanes_room = room_for(4), room_for(train.ROOM)
 
 
 @inner
@@ -203,6 +204,7 @@ def _build(stamp: int) -> Callable[..., Any]:
         q, P = q_room(), P_room()
         q[ORDER + 1] = 0.0
         fires, piece_fires = fires_room(), fires_room()
+        lanes = lanes_room()
         B1 = B_at(S[V_P], par)
         y_b = equilibrium(B1, par)
         for k in range(time.size - 1 if status == DONE else 0):
@@ -413,7 +415,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                         run_piece(
                             t, s + u * h, piece, q, P, degree, piece_fires, Q_error,
                             missed, swing, over, values[ORDER], par, S,
-                            borrowed(spikes), keep_spikes, most,
+                            borrowed(spikes), keep_spikes, most, lanes,
                         )  # fmt: skip
                         if S[TOO_FAST] != 0.0:
                             status = FAST

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
+from tactile_lab.model import train
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import (
     T_EPS,
@@ -22,6 +23,8 @@ from tactile_lab.model.integrator import (
     both_at,
     series_at,
 )
+from tactile_lab.model.tableau import ORDER
+from tactile_lab.model.train import foretell, remember, together
 
 VOLTAGE, REF, REF_LOW, RESUME, ERROR = range(5)
 """Integrator state: V_C2 = VOLTAGE at REF + REF_LOW s after the piece's start, held
@@ -86,6 +89,61 @@ def later(
 
 
 @inner
+def strike(
+    t: float,
+    s: float,
+    d: float,
+    e: float,
+    Q: float,
+    short: float,
+    end: float,
+    length: float,
+    whole: bool,
+    Q_error: float,
+    missed: float,
+    swing: float,
+    again: bool,
+    y: float,
+    par: FloatArray,
+    S: FloatArray,
+    spikes: FloatArray,
+    keep: bool,
+    most: float,
+) -> None:
+    """Let it fire d s after the integrator's reference, where Q is as given.
+
+    It may fire up to `end`; d is wrong by `short`, and expm1(-d/tau_L) is e; C2 was
+    charged from V_reset on if `whole`. See `run_piece` for all else.
+    """
+    V_f, V_r = par[V_FIRE], par[V_RESET]
+    per_tau = 1.0 / par[TAU_L]
+    # kept as a sum of two numbers
+    ref = S[REF]
+    rough = ref + d
+    low_part = S[REF_LOW] + ((ref - rough) + d)
+    v = rough + low_part
+    carry = (rough - v) + low_part
+    at = t + (s + v)
+    error = later(S[ERROR], e, Q_error, missed, swing, V_f, again)
+    time_error = error / max((Q - V_f) * per_tau, 1e-300)
+    time_error += EPS * d + short
+    if end - v < 2.0 * time_error and end < length:
+        S[DOUBT] = 1.0
+    fire(at, time_error, S)
+    if keep:
+        spikes[int(S[COUNT]) - 1] = at
+    if y < par[Y_SATURATED]:
+        S[SATURATED] = 1.0
+    S[ERROR] = time_error * (Q - V_r) * per_tau
+    S[REF], S[REF_LOW], S[VOLTAGE] = v, carry, V_r
+    if par[T_EPS] > 0.0:
+        S[RESUME] = v + carry + par[T_EPS]
+    closest = max(SHORTEST_INTERVAL, 4.0 * EPS * abs(at))
+    if (whole and d + par[T_EPS] < closest) or S[COUNT] >= most:
+        S[TOO_FAST] = 1.0
+
+
+@inner
 def most_spikes(length: float, highest: float, most: float, par: FloatArray) -> int:
     """What number of spikes cannot be exceeded in `length` s where Q <= `highest` V."""
     V_f, V_r = par[V_FIRE], par[V_RESET]
@@ -114,6 +172,7 @@ def run_piece(
     spikes: FloatArray,
     keep: bool,
     most: float,
+    lanes: FloatArray,
 ) -> None:
     """Carry V_C2 through a piece that starts s after the segment's start at t.
 
@@ -128,7 +187,10 @@ def run_piece(
     V_f, V_r = par[V_FIRE], par[V_RESET]
     known = again = False
     Q = P_now = drift = 0.0
-    d_1 = d_2 = d_3 = 0.0  # the last intervals
+    charges = 0  # of the last ones, that are known
+    if degree <= ORDER:
+        for n in range(degree + 1, ORDER + 1):
+            P[n] = 0.0
     for k in range(fires.size // 2):
         a, b = fires[2 * k], fires[2 * k + 1]
         while b > a:
@@ -145,6 +207,37 @@ def run_piece(
             V = S[VOLTAGE]
             if not known:
                 Q, P_now = both_at(q, P, degree, ref * to_x - 1.0)
+            more = left > 2.0 * lanes[train.BEFORE] and ref >= a
+            if charges > 0 and degree <= ORDER and more:
+                foretell(lanes)
+                lanes[train.FROM_Q], lanes[train.FROM_P] = Q, P_now
+                found, rounds = together(
+                    ref, to_x, b, S[ERROR], tau * drift, q, P, par, lanes
+                )  # fmt: skip
+                S[SEARCHES] += rounds
+                for i in range(found):
+                    if S[RESUME] >= 0.0:
+                        S[REF], S[REF_LOW], S[RESUME] = S[RESUME], 0.0, -1.0
+                    d = lanes[train.CHARGE + i]
+                    shift, bend = lanes[train.SHIFT + 1 + i], lanes[train.BEND + 1 + i]
+                    Q = lanes[train.AT_Q + i] + shift * bend
+                    strike(
+                        t, s, d, lanes[train.DECAY + i], Q, lanes[train.REST + i], b,
+                        length, True, Q_error, missed, swing, True, y, par, S, spikes,
+                        keep, most,
+                    )  # fmt: skip
+                    if S[TOO_FAST] != 0.0:
+                        return
+                    remember(d, charges, lanes)
+                    charges += 1
+                if found > 0:
+                    # the series there, from those evaluated last
+                    drift = bend * per_tau
+                    P_now = lanes[train.AT_P + found - 1]
+                    rises = lanes[train.AT_Q + found - 1] - P_now
+                    P_now += shift * (rises + 0.5 * shift * (bend - rises))
+                    known = True
+                    continue
             Q_ref, P_ref = Q, P_now
             above = V - P_ref
             need = V_f - V
@@ -153,8 +246,12 @@ def run_piece(
             d, e, short = max(a - ref, 0.0), 0.0, 0.0
             if need > 0.0:
                 d = left
-                if d_3 > 0.0:
-                    d = 3.0 * (d_1 - d_2) + d_3
+                if charges > 2:
+                    d = (
+                        lanes[train.BEFORE]
+                        + lanes[train.BEFORE + 1]
+                        + lanes[train.BEFORE + 2]
+                    )
                 elif -above > need:
                     # as if P went on in a straight line
                     rises = (Q_ref - P_ref) * per_tau
@@ -163,7 +260,7 @@ def run_piece(
                     if rise > 0.0:
                         d -= d * rises / rise
                 d = min(d, left) if d > 0.0 else left
-                drift_before = drift if d_1 > 0.0 else 0.0
+                drift_before = drift if charges > 0 else 0.0
                 too_low, margin = False, 0.0
                 for _ in range(100):
                     S[SEARCHES] += 1.0
@@ -228,38 +325,21 @@ def run_piece(
                     if margin < error:
                         S[DOUBT] = 1.0
                     break
-            # a spike at ref + d, kept as a sum of two numbers
-            rough = ref + d
-            low_part = S[REF_LOW] + ((ref - rough) + d)
-            v = rough + low_part
-            carry = (rough - v) + low_part
-            at = t + (s + v)
             if need <= 0.0:
                 e = math.expm1(-d / tau)
-                Q, P_now = both_at(q, P, degree, v * to_x - 1.0)
+                Q, P_now = both_at(q, P, degree, (ref + d) * to_x - 1.0)
             known = True
-            slope = (Q - V_f) * per_tau
-            error = later(S[ERROR], e, Q_error, missed, swing, V_f, again)
-            time_error = error / max(slope, 1e-300)
-            time_error += EPS * d + short
-            if b - v < 2.0 * time_error and b < length:
-                S[DOUBT] = 1.0
-            fire(at, time_error, S)
-            if keep:
-                spikes[int(S[COUNT]) - 1] = at
-            if y < par[Y_SATURATED]:
-                S[SATURATED] = 1.0
-            S[ERROR] = time_error * (Q - V_r) * per_tau
-            if again:
-                d_3, d_2, d_1 = d_2, d_1, d
-            again = True
-            S[REF], S[REF_LOW], S[VOLTAGE] = v, carry, V_r
-            if par[T_EPS] > 0.0:
-                S[RESUME] = v + carry + par[T_EPS]
-            closest = max(SHORTEST_INTERVAL, 4.0 * EPS * abs(at))
-            if (need == V_f - V_r and d + par[T_EPS] < closest) or S[COUNT] >= most:
-                S[TOO_FAST] = 1.0
+            whole = need == V_f - V_r
+            strike(
+                t, s, d, e, Q, short, b, length, whole, Q_error, missed, swing, again,
+                y, par, S, spikes, keep, most,
+            )  # fmt: skip
+            if S[TOO_FAST] != 0.0:
                 return
+            if again:
+                remember(d, charges, lanes)
+                charges += 1
+            again = True
     if S[RESUME] >= length:
         S[RESUME] -= length
         return

@@ -129,6 +129,26 @@ def test_a_train_takes_one_search_a_spike():
     assert found.stages["spikes"] < 1.7 * 111
 
 
+def test_a_long_train_is_searched_several_spikes_at_a_time():
+    """Each waited for the one before: 1.1 searches a spike."""
+    force = Waveform.through([(0, 0), (0.5, 0), (0.5, 0.4)])
+    found = simulate(Circuit(), force, until=2.5, tolerance=1e-6)
+    assert found.spike_times.size == 175
+    assert found.stages["spikes"] < 0.4 * 175
+    # with a reset time, through a force that rises and falls, and cut into slices
+    circuit = Circuit(firing="put")
+    force = Waveform.through([(0, 0), (0.1, 0.2), (2, 0.25), (4, 0.1), (5, 0.3)])
+    found = simulate(circuit, force, tolerance=1e-12)
+    state, parts = rest(circuit), []
+    for until in np.arange(0.03, 5.0, 0.03):  # of a spike or two: one by one
+        solved = advance(circuit, state, force, until, tolerance=1e-12)
+        state = solved.after
+        parts.extend(solved.spike_times)
+    whole = found.spike_times[: len(parts)]
+    assert whole.size > 80
+    assert np.abs(whole - parts).max() < 1e-11
+
+
 def test_a_search_stops_where_the_estimate_ends():
     """It took 1.9 a spike, for digits that the estimate says are wrong."""
     force = Waveform.through([(0, 0), (5, 0), (5.01, 0.05), (105, 0.05)])
