@@ -39,6 +39,7 @@ QLabel[role="section"] { font-size: 11px; font-weight: 600; color: $muted;
 QLabel[role="muted"] { color: $muted; font-size: 12px; }
 QLabel[role="small"] { color: $muted; font-size: 11px; }
 QLabel[role="value"] { font-size: 17px; font-weight: 600; }
+QLabel[role="small"]:disabled, QLabel[role="value"]:disabled { color: $faint; }
 QLabel[role="flatvalue"] { font-size: 14px; font-weight: 600; }
 QLabel[role="strong"] { font-weight: 600; }
 QLabel[role="error"] { color: $red; font-size: 12px; }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QGraphicsOpacityEffect, QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from gui.lanes.lane import title_of
 from gui.look.theme import Theme
@@ -27,7 +27,11 @@ HOW = {
 
 
 class FitCards(QWidget):
-    """Two by two; hidden while there is nothing to fit."""
+    """Two by two; hidden while there is nothing to fit.
+
+    Attributes:
+        old: whether a step has ended that is not in them yet; they are pale then.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -44,20 +48,13 @@ class FitCards(QWidget):
             self._labels.append((card, *parts))
         grid.setColumnStretch(0, 1)
         grid.setColumnStretch(1, 1)
-        self._pale = QGraphicsOpacityEffect(self)
-        self._pale.setOpacity(0.4)
-        self.setGraphicsEffect(self._pale)
         self.mark_old(False)
         self.hide()
 
-    @property
-    def old(self) -> bool:
-        """Whether a step has ended that is not in them yet; they are pale then."""
-        return self._pale.isEnabled()
-
     def mark_old(self, old: bool) -> None:
         """A step that is not in them has ended, or all are in them."""
-        self._pale.setEnabled(old)
+        self.old = old
+        self.setEnabled(not old)  # pale
         self.setToolTip("Without the newest step: it is being fitted" if old else "")
 
     def show_cards(self, cards: tuple[Card, ...]) -> None:

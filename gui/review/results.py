@@ -131,7 +131,8 @@ class ResultsView(QWidget):
         if len(steps) != len(self._steps):  # the same ones again are not yet fitted
             self.cards.mark_old(len(steps) > len(self._steps))
         self._steps, self._model, self._laws = tuple(steps), (), ()
-        self._show_rates()
+        if not running:  # each fit of a run draws the rates, and is on its way
+            self._show_rates()
         # while a run goes on, what lies below moves for no step of the first four
         self._fill(steps, max(len(steps), min(total or 4, 4) if running else 0))
         self._arrange()

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QApplication, QScrollArea
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QApplication, QFrame, QScrollArea
 
 from gui.look.theme import Theme
 from gui.review.live_plots import COLUMNS, column_plot, rate_plot
@@ -143,6 +144,44 @@ def test_cards_without_the_newest_step_are_pale(results: ResultsView) -> None:
     assert results.cards.old, "the run has ended, and the fit is still on its way"
     fitted(three)
     assert not results.cards.old and not results.cards.toolTip()
+
+
+def test_a_step_of_a_run_draws_the_rates_once(results: ResultsView) -> None:
+    """Its plots were made at its end, and again five frames later by the fit."""
+    results.show_steps([], total=3, running=True, whole=False)
+    results.show_fit(None)
+    for count in (1, 2, 3):
+        steps, before = [SLOW, FAST, SILENT][:count], list(results.plot.panels)
+        results.show_steps(steps, total=3, running=True, whole=False)
+        assert results.plot.panels == before, "the fit of the step is on its way"
+        results.show_fit(fit(steps, FitInput(np.empty(0), np.empty(0), {})))
+        assert results.plot.panels != before
+
+
+def test_pale_cards_lay_out_nothing_else(results: ResultsView, app) -> None:
+    """Each step's end took 36 ms, in which Qt laid out all that was hidden."""
+
+    class Hidden(QFrame):
+        resized = 0
+
+        def event(self, event: QEvent) -> bool:
+            self.resized += event.type() is QEvent.Type.Resize
+            return super().event(event)
+
+    hidden = Hidden(results)
+    hidden.hide()
+    results.show()
+    results.show_fit(fit([SLOW, FAST], FitInput(np.empty(0), np.empty(0), {})))
+    app.processEvents()
+    sharp = results.cards.grab().toImage()
+    hidden.resized = 0
+    hidden.resize(7, 7)
+    results.cards.mark_old(True)
+    app.processEvents()
+    assert hidden.resized == 0
+    assert results.cards.grab().toImage() != sharp
+    results.cards.mark_old(False)
+    assert results.cards.grab().toImage() == sharp
 
 
 def test_a_step_that_was_cut_short_says_so_in_full(results: ResultsView, app) -> None:
