@@ -92,6 +92,7 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]
         self._stage = stage
         # which it holds weakly: a circle would be left to Python's collector
         super().__init__("left", linkView=box)
+        self.enableAutoSIPrefix(False)  # it would lay out a name that nobody sees
         self.setZValue(-200)
 
     @guarded

@@ -10,7 +10,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from gui.lanes.box import heights_of
-from gui.lanes.floor import AXIS, cursor_times, round_times
+from gui.lanes.expected import Stretch
+from gui.lanes.floor import AXIS, cursor_times, grounds, round_times
 from gui.lanes.lane import lanes_for
 from gui.lanes.live import LiveSource
 from gui.lanes.paint import Frame, shortened, width_of
@@ -18,6 +19,7 @@ from gui.lanes.stack import LaneStack
 from gui.lanes.tools import Tools
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
+from gui.look.tokens import LIGHT
 from gui.parts import IconButton
 
 
@@ -224,3 +226,20 @@ def test_lanes_that_stay_keep_their_range_when_another_comes(app, stack):
     settle(app)
     assert stack.row("residual") is None
     assert shown(stack) == ["force", "V_C1", "V_K", "spikes", "rate"]
+
+
+def test_no_pixel_below_the_lanes_is_filled_twice() -> None:
+    """Of two steps that overlap the later is seen, and the future before any."""
+    source = LiveSource(None, 0.2)
+    steps = (-5, -2, ""), (0, 4, ""), (3, 5, "recovery"), (6, 99, "")
+    source.holds = [Stretch(a, b, t, pause=bool(t)) for a, b, t in steps]
+    source.add_reading("force", 8.0, 0.0)
+    across = grounds(source, Frame(50, 150, 0, 10, 0, 10, 0, 1), LIGHT)
+    plain, band, pause = LIGHT.plot, LIGHT.band, LIGHT.sunken
+    ahead = (130, LIGHT.ahead), (150, plain)
+    assert across == [
+        (0, plain), (50, band), (80, pause), (100, plain), (110, band), *ahead
+    ]  # fmt: skip
+    source.running = False
+    across = grounds(source, Frame(50, 150, 0, 10, 0, 10, 0, 1), LIGHT)
+    assert across[-2:] == [(110, band), (150, plain)]
