@@ -85,6 +85,11 @@ class RoundAxis(pg.AxisItem):  # type: ignore[misc]
         self.enableAutoSIPrefix(False)
         self.setStyle(tickFont=sized(11), tickAlpha=255)
 
+    def _updateLabel(self) -> None:
+        """Lay the name out where there is one: pyqtgraph does it eleven times."""
+        if self.labelText:
+            super()._updateLabel()
+
     def tint(self, tokens: Tokens) -> None:
         """Take on a theme's colours."""
         self.setTextPen(tokens.muted)

@@ -258,27 +258,25 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         self._errors(s, colour)
         if s.mark == "steps":
             x, y = np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
-        points: dict[str, Any] = {}
+        if s.mark not in POINTS or s.mark == "joined":
+            self._line(x, y, colour, mark=s.mark)
         if s.mark in POINTS:
             bare = s.mark == "open"
-            points = {
-                "symbol": POINTS[s.mark],
-                "symbolSize": 0.5 * SIZE if s.mark == "dots" else SIZE,
-                "symbolBrush": None if bare else QColor(colour),
-                "symbolPen": stroke(colour) if bare else None,
-            }
-            if s.mark != "joined":
-                points["pen"] = None
-        self._line(x, y, colour, **{"connect": "finite", **points}, mark=s.mark)
+            points = pg.ScatterPlotItem(
+                x, y, symbol=POINTS[s.mark],
+                size=0.5 * SIZE if s.mark == "dots" else SIZE,
+                brush=None if bare else QColor(colour),
+                pen=stroke(colour) if bare else None,
+            )  # fmt: skip
+            points.setEnabled(False)  # clicks on its points are for the box
+            self.box.addItem(points)
 
     def _line(
-        self, x: FloatArray, y: FloatArray, colour: str, mark: str = "line", **how: Any
-    ) -> None:
-        style = STYLES.get(mark, Qt.PenStyle.SolidLine)
-        how = {"pen": stroke(colour, self._ratio, style), **how}
-        drawn = pg.PlotDataItem(x, y, **how)
-        drawn.scatter.setEnabled(False)  # clicks on its points are for the box
-        self.box.addItem(drawn)
+        self, x: FloatArray, y: FloatArray, colour: str, *, mark: str = "line",
+        connect: str = "finite",
+    ) -> None:  # fmt: skip
+        pen = stroke(colour, self._ratio, STYLES.get(mark, Qt.PenStyle.SolidLine))
+        self.box.addItem(pg.PlotCurveItem(x, y, pen=pen, connect=connect))
 
     def _fill(
         self, x: FloatArray, low: FloatArray, high: FloatArray, colour: QColor

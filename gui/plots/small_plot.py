@@ -47,7 +47,7 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         super().__init__()
         self._theme, self.nothing, self._fixed = theme, nothing, height
         self.plot: Plot | None = None
-        self._told = b""
+        self._told = pickle.dumps((None, nothing))
         self.panels: list[PanelItem] = []
         self.tell: Callable[[int], str] = lambda number: ""
         self.setFixedHeight(height) if height else self.setMinimumHeight(PANEL)
