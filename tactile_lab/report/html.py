@@ -68,19 +68,18 @@ def picture(title: str, plot: Plot | TaxelMaps, svg: str) -> Picture:
 
 
 def inlined(described: str, caption: str, svg: str) -> Picture:
-    """The figure with the page's colours, without the heading the page has itself.
+    """The figure without the heading the page has itself.
+
+    Its colours stay as they are drawn: not every program that makes paper of a page
+    knows the page's within a figure, and black came of it. Only in the dark the style
+    sheet takes others.
 
     Args:
         described: for who cannot see it.
         caption: below it.
         svg: as matplotlib wrote it in the light palette.
     """
-    names = {colour.light: colour.name for colour in palette.ALL}
-    inline = re.sub(
-        r"#[0-9a-f]{6}\b",
-        lambda m: f"var(--{names[m[0]]}, {m[0]})" if m[0] in names else m[0],
-        svg[svg.index("<svg") :],
-    )
+    inline = svg[svg.index("<svg") :]
     top = HEAD_HEIGHT * 72 - 14
     inline = re.sub(
         r'(<svg[^>]*?) width="[^"]*" height="[^"]*" viewBox="0 0 (\S+) ([^"]+)"',
@@ -140,7 +139,12 @@ def written() -> str:
 def _colours() -> str:
     light = "".join(f"--{c.name}:{c.light};" for c in palette.ALL)
     dark = "".join(f"--{c.name}:{c.dark};" for c in palette.ALL)
+    drawn = "".join(
+        f'svg [style*="{what}: {c.light}"]{{{what}:{c.dark}!important}}\n'
+        for c in palette.ALL
+        for what in ("fill", "stroke")
+    )
     return (
         f":root{{{light}}}\n@media screen and (prefers-color-scheme:dark)"
-        f"{{:root{{{dark}}}}}\n"
+        f"{{:root{{{dark}}}\n{drawn}}}\n"
     )

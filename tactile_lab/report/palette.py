@@ -1,6 +1,6 @@
 """Colours of figures and page: Okabe-Ito hues, told apart by colour-blind readers.
 
-The light values are drawn; the page swaps them for the dark ones where the reader's
+The light values are drawn; the page takes the dark ones instead where the reader's
 system is dark.
 """
 
