@@ -59,6 +59,11 @@ class Trial:
         end = (self.current or self.force).end
         return end if self.duration is None else self.duration
 
+    @property
+    def onset(self) -> float | None:
+        """When what is asked for begins to change, s; None where it never does."""
+        return (self.current or self.force).departure(0.0, self.length, near=0.0)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outcome:

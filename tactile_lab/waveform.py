@@ -178,22 +178,26 @@ class Waveform:
         there = self.time[inside][away[-1] + 1 :]
         return float(there[0]) if there.size else at
 
-    def departure(self, since: float, until: float) -> float | None:
-        """When it begins to leave the value it has at `since` s; None if never.
+    def departure(self, since: float, until: float, near: float = NEAR) -> float | None:
+        """When it begins to leave the value it comes to `since` s with; None if never.
 
-        It has not left while it changes by less than `NEAR` of its largest change.
+        It has not left while it changes by less than `near` of its largest change.
 
         Args:
-            since: s.
+            since: s; a jump there is a departure.
             until: nothing beyond is looked at, s.
+            near: part of its largest change.
         """
         inside = (self.time >= since) & (self.time <= until)
-        apart = np.abs(self.value[inside] - float(self.at(since)))
-        if not apart.size or apart.max() == 0:
+        times, values = self.time[inside], self.value[inside]
+        if not times.size:
             return None
-        first = int(np.argmax(apart > NEAR * apart.max()))
-        times = self.time[inside]
-        return float(times[max(first - 1, 0)])
+        came = values[0] if times[0] == since else self.at(since)
+        apart = np.abs(values - came)
+        if apart.max() == 0:
+            return None
+        first = int(np.argmax(apart > near * apart.max()))
+        return float(times[first - 1]) if first > 0 else since
 
     def segments(self) -> Iterator[tuple[float, float, float, float]]:
         """Each (start s, end s, value at start, value at end); jumps have no length."""

@@ -139,4 +139,8 @@ def test_when_a_late_staircase_leaves_and_arrives():
     assert late.departure(0.0, 4.0) == pytest.approx(0.07)
     assert late.arrival(2.5, 0.0) == pytest.approx(0.12)
     assert late.departure(1.0, 4.0) is None, "it never leaves"
+    slow = Waveform.through([(0, 0), (1, 0), (2, 0.001), (3, 1)])
+    assert (slow.departure(0, 3), slow.departure(0, 3, near=0)) == (2.0, 1.0)
+    assert Waveform.pulse(1.0, ramp=0.0, hold=2.0).departure(0.0, 3.0) == 0.0
+    assert slow.departure(2.5, 3.0) == 2.5, "it is on its way"
     assert late.arrival(2.5, 1.0) == 1.0, "it was there"

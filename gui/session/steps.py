@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from gui.plots.numbers import number
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.quantity import show
+from tactile_lab.store.onset import begun
 from tactile_lab.trial import Outcome
 from tactile_lab.waveform import Waveform
 
@@ -47,12 +48,10 @@ def of_outcome(outcome: Outcome) -> MeasuredTrial | None:
 
 def _begun(outcome: Outcome) -> float | None:
     """When its current began to change, s from its start; None where it never did."""
-    trial = outcome.trial
-    asked = (trial.current or trial.force).departure(0.0, trial.length)
+    asked, length = outcome.trial.onset, outcome.trial.length
     if asked is None or not len(outcome.current):
         return asked
-    flowing = Waveform.stairs(outcome.current, trial.length)
-    return flowing.departure(asked, trial.length)
+    return begun(asked, Waveform.stairs(outcome.current, length), 0.0, length)
 
 
 def of_run(source: RunSource) -> list[MeasuredTrial]:

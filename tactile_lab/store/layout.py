@@ -51,8 +51,8 @@ TABLES = {
     "temperature": "time f8 s, temperature f8 K",
     "voltages": "time f8 s, name S8, setpoint f8 V, measured f8 V, current f8 A",
     "trials": "index u4, start f8 s, end f8 s, level f8 N, hold_start f8 s, "
-    "hold_end f8 s, spikes u4, skipped u4, pause u1, label S48, rest_V_C1 f8 V, "
-    "drift_V_C1 f8 V, complete u1",
+    "hold_end f8 s, onset f8 s, spikes u4, skipped u4, pause u1, label S48, "
+    "rest_V_C1 f8 V, drift_V_C1 f8 V, complete u1",
     "pauses": "start f8 s, end f8 s",
     "events": "time f8 s, kind S16, text S160",
 }

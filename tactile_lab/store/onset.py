@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from tactile_lab.scene.scene import Scene
 from tactile_lab.stimulus.force import ForceProtocol
 from tactile_lab.store.stored_run import Records, StoredRun
-
-
-def stimulus_onset(scene: Scene) -> float:
-    """When a presentation of the scene's protocol begins to change the force, s."""
-    if not isinstance(scene.protocol, ForceProtocol):
-        return 0.0
-    force = next(scene.protocol.presentations()).force
-    changed = np.flatnonzero(force.value != force.value[0])
-    return float(force.time[changed[0] - 1]) if changed.size else 0.0
+from tactile_lab.waveform import Waveform
 
 
 def onsets(run: StoredRun, trials: Records) -> list[float | None]:
     """Of each trial, s from its start; None where the force applied stands still.
-
-    A coil that is set over a serial line begins later than asked.
 
     Args:
         run: that they are of.
@@ -30,9 +20,34 @@ def onsets(run: StoredRun, trials: Records) -> list[float | None]:
     Raises:
         SceneError: the run's scene cannot be read any more.
     """
-    asked, found = stimulus_onset(run.scene), []
-    for row in trials:
-        start, end = float(row["start"]), float(row["end"])
-        left = run.force.departure(start + asked, end)
-        found.append(None if left is None else left - start)
-    return found
+    if "onset" in (trials.dtype.names or ()):
+        asked = trials["onset"].tolist()
+    else:  # older runs lack it
+        asked = [_first_onset(run.scene)] * len(trials)
+    return [
+        None if math.isnan(at) else begun(at, run.force, float(start), float(end))
+        for at, start, end in zip(asked, trials["start"], trials["end"], strict=True)
+    ]
+
+
+def begun(asked: float, applied: Waveform, start: float, end: float) -> float | None:
+    """When `applied` began to change in a trial, s from its start; None if never.
+
+    A coil that is set over a serial line begins later than asked, and still ends the
+    trial before when this one begins: that is no change of this one's.
+
+    Args:
+        asked: when it was to begin, s from the trial's start.
+        applied: force or current.
+        start: of the trial, s on the axis of `applied`.
+        end: of the trial, likewise.
+    """
+    left = applied.departure(start + asked, end)
+    return None if left is None else left - start
+
+
+def _first_onset(scene: Scene) -> float:
+    """When the first presentation of the scene's protocol begins to change it, s."""
+    if not isinstance(scene.protocol, ForceProtocol):
+        return 0.0
+    return next(scene.protocol.presentations()).onset or 0.0

@@ -374,7 +374,14 @@ def _trial_row(
     """
     begin, end = trial.hold or (math.nan, math.nan)
     place = (index, start, start + trial.length, _number(trial.level), begin, end)
-    return (*place, *counts, trial.pause, _fixed(trial.label, 48), *rests)
+    return (
+        *place,
+        _number(trial.onset),
+        *counts,
+        trial.pause,
+        _fixed(trial.label, 48),
+        *rests,
+    )
 
 
 def _number(value: float | None) -> float:

@@ -21,7 +21,6 @@ from tactile_lab.report.splice import stretches
 from tactile_lab.report.table import trials_table
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
-from tactile_lab.store.onset import stimulus_onset
 from tactile_lab.waveform import Waveform
 
 
@@ -283,11 +282,13 @@ def test_a_run_with_nothing_measured_still_reports(demo, tmp_path):
         ("demo", [], 0.0),
         ("hold_10s", ['protocol.before="0.3 s"'], 0.3),
         ("waveform", [], 0.5),
-        ("monitor", [], 0.0),
+        ("monitor", [], None),
+        ("touch", [], 0.0),
     ],
 )
 def test_latency_counts_from_where_the_force_begins(scene, overrides, onset):
-    assert stimulus_onset(load(scene, overrides)) == pytest.approx(onset)
+    trial = next(load(scene, overrides).protocol.trials())
+    assert trial.onset == (None if onset is None else pytest.approx(onset))
 
 
 def test_the_sensor_is_told_as_it_is_at_its_temperature():

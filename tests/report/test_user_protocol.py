@@ -53,6 +53,26 @@ class Own(Protocol):
                    panels=(Panel(label="V_C1", unit="V", series=(series,)),))
 """
 SLOW = ("record.sample_rate=10 kS/s",)
+WAITS = """
+from typing import ClassVar
+
+from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.trial import Trial, Trials
+from tactile_lab.waveform import Waveform
+
+
+class Waits(ForceProtocol):
+    name: ClassVar[str] = "waits"
+    title: ClassVar[str] = "Each begins at another time"
+    signals: ClassVar[tuple[str, ...]] = ("force", "V_C1")
+
+    def presentations(self) -> Trials:
+        for before, rest in ((0.5, 0.2), (0.0, 0.0), (0.3, 0.0)):
+            push = Waveform.pulse(0.05, ramp=0.1, hold=0.3, rest=rest).shifted(before)
+            points = zip(push.time, push.value)
+            force = push if before == 0 else Waveform.through([(0.0, 0.0), *points])
+            yield Trial(force=force, label=f"after {before:g} s")
+"""
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +116,19 @@ def test_an_old_run_concludes_and_draws_by_the_file_it_keeps(made):
     said = CliRunner().invoke(cli, ["report", str(made)]).stdout
     assert f"\n\n{found['statements'][0]}\n\nFalls\n" in said
     assert "\n\nfigure  " in said
+
+
+def test_each_trial_begins_where_its_own_force_does(tmp_path):
+    """All counted from where the first one's begins, where the second stands still.
+
+    The second does not rest, so that its fall ends in the third, before that begins.
+    """
+    (tmp_path / "waits.py").write_text(WAITS)
+    scene = load(str(tmp_path / "waits.py"), SLOW)
+    ran = Execution(scene, tmp_path / "runs").run()
+    told, late = [trial.onset for trial in read(ran.folder).results], 2 * 0.0455
+    for onset, asked in zip(told, (0.5, 0.0, 0.3), strict=True):
+        assert asked <= onset <= asked + late, "set-points come every 45.5 ms"
 
 
 def test_the_window_reads_the_same_drawings(made):
