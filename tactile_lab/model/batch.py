@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tactile_lab.arrays import FloatArray
 from tactile_lab.model import derived, kernel, packed, spiking
 from tactile_lab.model.circuit import LARGEST, LARGEST_VOLTAGE, SMALLEST, Circuit, units
-from tactile_lab.model.compiled import entry, inner, source_stamp
+from tactile_lab.model.compiled import entry, inner, inner_making_arrays, source_stamp
 from tactile_lab.model.need import checked_tolerance
 from tactile_lab.model.rest_pair import rest_of_cascade
 from tactile_lab.model.solver import MOST_SPIKES
@@ -137,7 +137,7 @@ _critical_force = inner(derived.critical_force)
 _fill = inner(packed.fill)
 
 
-@inner
+@inner_making_arrays
 def appended(whole: FloatArray, size: int, part: FloatArray, more: int) -> FloatArray:
     """The array with `more` of `part` after its first `size`, moved if need be."""
     if size + more > whole.size:
@@ -158,12 +158,13 @@ def numbers_of(c: Any, direct: bool, par: FloatArray) -> float:
 @inner
 def begun(V_P: float, y: float, v: float, S: FloatArray) -> None:
     """Set the kernel's memory to these voltages, V, before the first spike."""
-    S[:] = kernel.FRESH
+    for i in range(S.size):
+        S[i] = kernel.FRESH[i]
     S[kernel.Y], S[spiking.VOLTAGE] = y, v
     S[kernel.V_P] = S[kernel.V_P_HIGHEST] = V_P
 
 
-@inner
+@inner_making_arrays
 def train(
     c: Any,
     k_F: float,

@@ -34,6 +34,9 @@ _INNER: dict[str, Any] = {
     "no_cfunc_wrapper": True,
 }
 
+_LENT = {"_nrt": False}
+"""Without numba's counting of owners, which then refuses to make an array."""
+
 
 class _FirstUse(event.Listener):
     """Says that code is compiled, once, and only where the disk has none of it."""
@@ -55,7 +58,16 @@ event.register(_FirstUse.KIND, _FirstUse())  # type: ignore[no-untyped-call]
 
 
 def inner(function: F) -> F:
-    """Compile as part of whichever entry point calls it."""
+    """Compile as part of whichever entry point calls it.
+
+    Arrays are lent to it: it counts no owners and must neither make an array nor
+    return one.
+    """
+    return cast(F, njit(**_INNER | _LENT)(function))
+
+
+def inner_making_arrays(function: F) -> F:
+    """The same for a function that makes arrays or returns one."""
     return cast(F, njit(**_INNER)(function))
 
 

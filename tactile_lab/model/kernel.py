@@ -11,7 +11,7 @@ import numpy as np
 from tactile_lab.arrays import FloatArray
 from tactile_lab.model import train
 from tactile_lab.model.circuit import LARGEST_VOLTAGE
-from tactile_lab.model.compiled import entry, inner, source_stamp
+from tactile_lab.model.compiled import entry, inner, inner_making_arrays, source_stamp
 from tactile_lab.model.integrator import (
     MOST_TERMS,
     T_EPS,
@@ -87,7 +87,7 @@ q_room, P_room = room_for(ORDER + 2), room_for(2 * MOST_TERMS + 2)
 fires_room, lanes_room = room_for(4), room_for(train.ROOM)
 
 
-@inner
+@inner_making_arrays
 def more_rows(rows: FloatArray, count: int) -> FloatArray:
     """The store, or a copy of twice its length where it is full."""
     if count < rows.shape[0]:
@@ -99,7 +99,7 @@ def more_rows(rows: FloatArray, count: int) -> FloatArray:
     return larger
 
 
-@inner
+@inner_making_arrays
 def stored(
     segments: FloatArray, steps: FloatArray, pieces: FloatArray, S: FloatArray
 ) -> FloatArray:
@@ -141,7 +141,7 @@ def value_at(time: FloatArray, value: FloatArray, k: int, t: float) -> float:
     return float(F0 + (t - t0) / (t1 - t0) * (F1 - F0))
 
 
-@inner
+@inner_making_arrays
 def points_between(
     time: FloatArray, value: FloatArray, start: float, force: float, until: float
 ) -> tuple[FloatArray, FloatArray]:

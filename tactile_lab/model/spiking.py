@@ -13,7 +13,7 @@ import numpy as np
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.model import train
-from tactile_lab.model.compiled import inner
+from tactile_lab.model.compiled import inner, inner_making_arrays
 from tactile_lab.model.integrator import (
     T_EPS,
     TAU_L,
@@ -39,7 +39,7 @@ SHORTEST_INTERVAL = 1e-9
 """Spikes closer than this, s, are refused: no circuit, and no end of them."""
 
 
-@inner
+@inner_making_arrays
 def grown(spikes: FloatArray, count: int) -> FloatArray:
     """The array if it has a place `count`, or a copy of at least twice its size."""
     if count < spikes.size:

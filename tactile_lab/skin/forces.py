@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.model.compiled import entry, inner, source_stamp
+from tactile_lab.model.compiled import entry, inner, inner_making_arrays, source_stamp
 from tactile_lab.skin.contact import COLUMNS, KIND, SHAPE_1, SHAPE_2, SPHERE, STRIP
 from tactile_lab.skin.skin import Skin
 from tactile_lab.skin.track import (
@@ -151,7 +151,7 @@ def force_at(at: FloatArray, pressing: Any, t: float) -> float:
     return float(pressing.area * total)
 
 
-@inner
+@inner_making_arrays
 def longer(numbers: FloatArray, size: int) -> FloatArray:
     """The array, or a longer copy where so many do not fit."""
     if size <= numbers.size:
@@ -161,7 +161,7 @@ def longer(numbers: FloatArray, size: int) -> FloatArray:
     return larger
 
 
-@inner
+@inner_making_arrays
 def slid(
     at: FloatArray, pressing: Any, s: int, end: float, error: float,
     time: FloatArray, force: FloatArray, size: int,
@@ -203,7 +203,7 @@ def slid(
     return time, force, size
 
 
-@inner
+@inner_making_arrays
 def force_on(
     x: float, y: float, pressing: Any, framed: FloatArray, error: float
 ) -> Any:

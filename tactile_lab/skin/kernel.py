@@ -11,7 +11,7 @@ import numpy as np
 from tactile_lab.arrays import FloatArray
 from tactile_lab.model import coupled, kernel, spiking
 from tactile_lab.model.batch import appended, begun, numbers_of, train
-from tactile_lab.model.compiled import entry, inner, source_stamp
+from tactile_lab.model.compiled import entry, inner, inner_making_arrays, source_stamp
 from tactile_lab.model.integrator import TAU_L, V_FIRE, Y_CRITICAL, Q_at
 from tactile_lab.model.node_a import LAMBDA, TAU, B_at, V_P_at, equilibrium
 from tactile_lab.model.rest_pair import rest_of_both
@@ -63,7 +63,7 @@ def surely_silent(V: float, par: FloatArray) -> bool:
     return bool(Q_at(lowest, par) + more < par[V_FIRE])
 
 
-@inner
+@inner_making_arrays
 def train_of_both(
     c: Any,
     k_F: float,
