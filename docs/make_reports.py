@@ -150,7 +150,7 @@ def main() -> None:
             left.append(name)
     minutes = {n: known.get(n, {}).get("minutes", STEPS[n][0]) for n in left}
     told = ", ".join(f"{name} {minutes[name]:.0f}" for name in left)
-    print(f"{sum(minutes.values()) / 60:.1f} h left, in minutes: {told or 'nothing'}")
+    print(f"{sum(minutes.values()):.0f} minutes left: {told or 'nothing'}")
     for name in left:
         print(f"{name} ...", flush=True)
         began = time.monotonic()

@@ -1,7 +1,11 @@
 """The page on the coverage of intervals: what it calls evidence."""
 
+import json
 import runpy
+import sys
 from pathlib import Path
+from subprocess import CalledProcessError
+from types import SimpleNamespace
 
 import pytest
 from bench_coverage_page import table
@@ -86,3 +90,19 @@ def test_every_page_that_measures_is_listed_with_what_it_measures():
     told = made["pages"]()
     for path in (root / "docs").glob("*-figures.md"):
         assert f"| {path.stem} |" in told
+
+
+def test_reports_say_how_long_they_take_and_go_on_where_they_were(tmp_path, capsys):
+    made = runpy.run_path(str(Path(__file__).parents[2] / "docs" / "make_reports.py"))
+    main, names, done = made["main"], made["STEPS"], tmp_path / "reports.json"
+    names.clear()
+    names.update(first=(2, "-c pass"), second=(70, "-c raise(SystemExit(3))"))
+    asked = SimpleNamespace(argv=[""], executable=sys.executable)
+    main.__globals__.update(DONE=done, sys=asked)
+    with pytest.raises(CalledProcessError):
+        main()
+    assert capsys.readouterr().out.startswith("72 minutes left: first 2, second 70")
+    names["second"] = (70, "-c pass")
+    main()
+    assert capsys.readouterr().out.startswith("first: done at")
+    assert set(json.loads(done.read_text())) == {"first", "second"}
