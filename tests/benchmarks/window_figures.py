@@ -25,6 +25,11 @@ START, SCALED = "Start", "Scaled screens"
 PARTS = (
     (START, "window_start.py", ("6",), ("3",)),
     ("Frames and gaps", "window_frames.py", ("20",), ("6",)),
+    *(
+        (f"Frames and gaps at scale {scale}", "window_frames.py",
+         ("20", "--scale", scale), ("6", "--scale", scale))
+        for scale in ("1.5", "2")
+    ),
     ("Memory of all processes", "window_memory.py", ("50",), ("16",)),
     ("STOP, by parts", "window_stop.py", (), ()),
     (SCALED, "window_scales.py", ("--rounds", "3"), ("--rounds", "1")),

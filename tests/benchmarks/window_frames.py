@@ -1,6 +1,6 @@
 """What a frame of the window costs, with the figures the window's issue asks for.
 
-    python tests/benchmarks/window_frames.py [SECONDS]
+    python tests/benchmarks/window_frames.py [SECONDS] [--scale FACTOR]
 
 Idle, a run in real time on the simulated bench, an emulated input of 4 x 7.8125 MS/s,
 and an hour-long record at 1 MS/s scrolled and zoomed. A frame is the poll plus the
@@ -9,10 +9,12 @@ other programs on the machine do not change. All lanes are painted in every fram
 those of the run in real time: there the window paints where something was told, and
 frames that painted nothing are left out. Gaps are those of a 10 ms heartbeat; "of
 its own" leaves out the time in which Linux gave the processor to somebody else.
+The window has 1720 x 1080 px; with `--scale`, so many device pixels to each.
 
 `window_figures.py` puts this and its neighbours into one page.
 """
 
+import argparse
 import os
 import sys
 import tempfile
@@ -279,4 +281,9 @@ def main(seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else 6.0)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("seconds", type=float, nargs="?", default=6.0)
+    parser.add_argument("--scale", default=os.environ.get("QT_SCALE_FACTOR", "1"))
+    options = parser.parse_args()
+    os.environ["QT_SCALE_FACTOR"] = options.scale
+    main(options.seconds)

@@ -65,7 +65,8 @@ def opened(bench: Bench, folder: Path, what: str) -> RunSource:
 def zoomed(bench: Bench, source: RunSource, pictures: Path | None) -> None:
     """Zoom about a spike to `NARROW` and back, a notch a frame; then drag."""
     view = bench.window.centre.view
-    spike = float(source.spikes[source.spikes.size // 2])
+    spikes = source.spikes  # a short run has none
+    spike = float(spikes[spikes.size // 2]) if spikes.size else source.length / 2
     view.show_all()
     bench.measure("whole run", 2.0)
     shoot(bench, pictures, "whole")
