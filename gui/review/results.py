@@ -153,6 +153,7 @@ class ResultsView(QWidget):
         self._model = () if found is None else found.model
         self._laws = () if found is None else found.rates
         self._show_rates()
+        self._arrange()
 
     def show_kind(self, *, fires: bool) -> None:
         """Say whether spikes are looked for: without them there are no rates."""

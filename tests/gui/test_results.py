@@ -156,6 +156,7 @@ def test_a_step_of_a_run_draws_the_rates_once(results: ResultsView) -> None:
         assert results.plot.panels == before, "the fit of the step is on its way"
         results.show_fit(fit(steps, FitInput(np.empty(0), np.empty(0), {})))
         assert results.plot.panels != before
+        assert not results.trains.isHidden(), "the first step fired"
 
 
 def test_pale_cards_lay_out_nothing_else(results: ResultsView, app) -> None:
