@@ -162,8 +162,8 @@ def emulated(
         seen, begun = 0, time.monotonic()
         for number in range(int(seconds / 0.05)):
             live.add(Block(number * count, codes, (False,) * 4, 0.0))
-            tell(Samples({s: live.since(seen, s) for s in SIGNALS}, OFF))
-            seen = live.written
+            seen, fresh = live.fresh(seen)
+            tell(Samples(fresh, OFF))
             ahead = begun + (number + 1) * 0.05 - time.monotonic()
             if ahead > 0:
                 time.sleep(ahead)
