@@ -127,7 +127,7 @@ def applied_current(
         seen = np.full(begin.size, np.nan)
         for i in np.flatnonzero(~own_clock[1:]) + 1:
             since = max(begin[i - 1], np.fmin(begin[i] - BEFORE, sent_at[i]))
-            at = _edge(shunt, since, begin[i], level[i - 1], level[i])
+            at = _edge(shunt, since, begin[i], level[i - 1], level[i], coil_lag)
             seen[i] = np.nan if at is None else at - math.log(2) * coil_lag
         shown = np.isfinite(seen)
         edges = int(shown.sum())
@@ -171,8 +171,8 @@ def _timing(heard: FloatArray, early: FloatArray, coil_lag: float) -> float:
 
     What scatters between neighbours is how well edges are seen and how steadily the
     host heard of them, so it holds for steps that were moved by their neighbours too.
-    What all edges share is that between two bins a current is taken to rise along a
-    line, where it bends by L/R.
+    What all edges share is that a current bends by L/R within a bin, which is put right
+    (`_edge`) and left open as well: L/R is not known exactly.
 
     Args:
         heard: when the host heard of each step that was seen, s.
@@ -201,9 +201,13 @@ def _level(sent: float, read: FloatArray) -> float:
 
 
 def _edge(
-    shunt: Shunt, since: float, heard: float, old: float, new: float
+    shunt: Shunt, since: float, heard: float, old: float, new: float, coil_lag: float
 ) -> float | None:
-    """When the shunt passed half the step to `new` A; None if it does not show it."""
+    """When the current passed half the step to `new` A; None if no shunt shows it.
+
+    Between two bins the shunt is taken to rise along a line, and a bin has the current
+    of its middle; that is put right for what bends by L/R, to second order of a bin.
+    """
     if abs(new - old) < VISIBLE:
         return None
     time, value = shunt(since, heard + AFTER)
@@ -219,4 +223,8 @@ def _edge(
     if time[i] - time[i - 1] > 1.5 * np.median(np.diff(time)):
         return None  # it came in a gap
     part = (0.5 - done[i - 1]) / (done[i] - done[i - 1])
-    return float(time[i - 1] + part * (time[i] - time[i - 1]))
+    width = float(time[i] - time[i - 1])
+    if coil_lag < width:  # what then happens within a bin is no bend
+        return float(time[i - 1] + part * width)
+    late = (part * (1 - part) / 2 + 1 / 24) * width**2 / coil_lag
+    return float(time[i - 1] + part * width - late)
