@@ -169,22 +169,6 @@ class Combo(QComboBox):
         """Leave the wheel to the page."""
         event.ignore()
 
-    def showPopup(self) -> None:
-        """Open the list as high as its rows need; Qt forgets the style's padding."""
-        super().showPopup()
-        view = self.view()
-        bar = view.verticalScrollBar()
-        if 0 < self.count() <= self.maxVisibleItems() and bar.maximum() > 0:
-            frame = view.window()
-            rows = sum(view.sizeHintForRow(row) for row in range(self.count()))
-            more = rows - view.viewport().height()
-            frame.resize(frame.width(), frame.height() + max(more, 0))
-            below = (
-                frame.screen().availableGeometry().bottom() - frame.geometry().bottom()
-            )
-            if below < 0:
-                frame.move(frame.x(), frame.y() + below)
-
 
 class Segments(QFrame):
     """A row of exclusive choices; `group.idClicked` tells which."""

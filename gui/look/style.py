@@ -132,11 +132,13 @@ QLineEdit[invalid="true"] { border: 2px solid $red; padding: 2px 7px; }
 QAbstractSpinBox::up-button, QAbstractSpinBox::down-button { width: 0; border: 0; }
 QAbstractSpinBox QLineEdit { border: 0; padding: 0; min-height: 0;
   background: transparent; }
+QComboBox { combobox-popup: 0; }
 QComboBox::drop-down { border: 0; width: 22px; }
 QComboBox::down-arrow { image: url("$arrow"); width: 12px; height: 12px; }
 QComboBox QAbstractItemView { background: $panel; border: 1px solid $border_strong;
   selection-background-color: $selected; selection-color: $selected_text;
   outline: 0; padding: 4px; }
+QComboBox QAbstractItemView::item { min-height: 24px; }
 QCheckBox { spacing: 8px; background: transparent; border: 2px solid transparent;
   border-radius: 6px; padding: 1px; }
 QCheckBox:focus { border-color: $accent; }

@@ -157,7 +157,10 @@ def test_a_list_opens_with_all_its_rows(lab) -> None:
     for box in boxes:
         box.showPopup()
         lab.app.processEvents()
-        assert box.view().verticalScrollBar().maximum() == 0, box.accessibleName()
+        view = box.view()
+        assert view.verticalScrollBar().maximum() == 0, box.accessibleName()
+        # no room for Qt's arrows: they hid a row at every other opening on X11
+        assert view.geometry() == view.window().rect()
         box.hidePopup()
 
 
