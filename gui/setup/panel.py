@@ -36,6 +36,7 @@ from gui.setup.queue import QueueView
 from gui.setup.sections import Sections
 from gui.setup.subject import Subject
 from gui.state import Snapshot, WindowState, run_problem
+from gui.tab_order import reach
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError
 
@@ -180,7 +181,8 @@ class SetupPanel(QFrame):
         if problem:
             self._show_strip(problem, warning=True)
         elif self.form.fields:
-            self.form.fields[0].setFocus()
+            first = self.form.fields[0]
+            QTimer.singleShot(0, first, lambda: reach(first))  # it has its place then
 
     def save(self) -> None:
         """Replace the edited run's parameters, as soon as they are planned."""

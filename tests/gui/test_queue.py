@@ -9,6 +9,7 @@ from gui.parts import IconButton
 from gui.session.queue import Queued
 from gui.setup.queue import QueueView
 from gui.state import WindowState
+from gui.tab_order import scroll
 from tactile_lab.engine.request import Request
 from tactile_lab.scene.load import load
 
@@ -154,9 +155,13 @@ def test_cancel_leaves_queue_and_form_as_they_were(lab) -> None:
     before = setup.form.texts()
     three_waiting(lab)
     asked = [item.request for item in session.queue.items]
+    scroll(setup, 1)
     setup.queue.cards[2].setFocus()
     QTest.keyClick(setup.queue.cards[2], Qt.Key.Key_Return)
     assert setup.form.field("hold").text == "3 s"
+    first = setup.form.fields[0].findChild(QLineEdit)
+    lab.until(first.hasSelectedText)  # what is typed now replaces it
+    assert not first.visibleRegion().isEmpty(), "the keyboard is where nobody sees it"
     type_into(setup.form.field("hold"), "9 s")
     setup.edit(session.queue.items[0])
     assert "First save or cancel" in setup.strip.text()
