@@ -221,6 +221,11 @@ def count(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
+def looked_for(number: int | None, what: str) -> str:
+    """What was found: "5 spikes", or "spikes not looked for" for None."""
+    return f"{what}s not looked for" if number is None else count(number, what)
+
+
 class SIFloat(float):
     """A float given in Python: SI, also where a file must write the unit."""
 

@@ -22,7 +22,7 @@ from gui.state import WindowState
 from tactile_lab.engine.memory import trim
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import RunFolderError, TactileLabError
-from tactile_lab.quantity import count, show
+from tactile_lab.quantity import looked_for, show
 from tactile_lab.signals import AVERAGED
 from tactile_lab.store.catalogue import Catalogue
 from tactile_lab.store.folder import DATA
@@ -253,7 +253,8 @@ class Screen(QObject):
     def run_ended(self, done: Executed) -> None:
         """The run is on disk now."""
         self.ending = (
-            f"{done.state.capitalize()} · {done.folder.name} · {done.spikes} spikes"
+            f"{done.state.capitalize()} · {done.folder.name} · "
+            f"{looked_for(done.spikes, 'spike')}"
         )
         source = self._panels.session.source
         if source is not None:
@@ -333,7 +334,8 @@ class Screen(QObject):
         panels.centre.view.clear_cursors()
         panels.centre.show_source(source, self._lanes())
         status = str(source.info.get("status")).capitalize()
-        spikes = count(source.spikes.size, "spike")
+        searched = "spikes" in source.signals
+        spikes = looked_for(source.spikes.size if searched else None, "spike")
         self.results.stored(source)
         self._show_stored(source, f"{status} · {source.path.name} · {spikes}")
         self.changed.emit()

@@ -27,7 +27,7 @@ from tactile_lab.engine.events import (
 from tactile_lab.engine.jobs import follow_run, write_report
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
-from tactile_lab.quantity import show
+from tactile_lab.quantity import looked_for, show
 
 if TYPE_CHECKING:
     from gui.session.expectation import Expectation
@@ -204,7 +204,7 @@ class LiveRun(LiveTask):
         self.elapsed = done.duration
         level = Severity.GOOD if off.verified else Severity.ERROR
         self._log.add(level, "safety", f"Coil: {off.text}", safety=True)
-        words = f"{folder.name} {done.state}: {done.spikes} spikes"
+        words = f"{folder.name} {done.state}: {looked_for(done.spikes, 'spike')}"
         lost = done.loss.get("samples")
         if lost is not None:
             words += f", {lost} samples lost"

@@ -91,14 +91,14 @@ class Executed(Ending):
 
     Attributes:
         folder: where it lies.
-        spikes: detected on line.
+        spikes: detected on line; None where none were looked for.
         loss: samples and spikes lost; None where it cannot be told.
         duration: of the experiment, s.
         took: wall time, s.
     """
 
     folder: Path
-    spikes: int
+    spikes: int | None
     loss: Mapping[str, int | None]
     duration: float
     took: float

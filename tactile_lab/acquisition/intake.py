@@ -46,6 +46,7 @@ class Intake:
 
     Attributes:
         spikes: number of spikes so far.
+        searched: whether spikes were looked for.
         produced: samples per channel the scope delivered.
         late: by how much more the samples' times lag behind this computer's clock than
             when the stream began, as the scope's clock is another one, s; never more
@@ -62,7 +63,7 @@ class Intake:
         self._readings: list[tuple[str, Reading]] = []
         self._start = 0.0
         self._expected = 0
-        self.spikes = 0
+        self.spikes, self.searched = 0, False
         self._spike_times: list[float] = []
         self.produced = 0
         self.late = 0.0
@@ -113,6 +114,7 @@ class Intake:
         self._row, self._scale = row, scale
         self._stream, self._start, self._expected = stream, start, 0
         self._detector, self._journal = detector, journal
+        self.searched = detector is not None
         self.late, self._least_lag, self._lag_at_begin = 0.0, math.inf, None
         self._lags_since = start
         self._means = {

@@ -175,7 +175,7 @@ class Execution(Task[Executed]):
         return Executed(
             **vars(ending),
             folder=self.folder.path,
-            spikes=runner.intake.spikes,
+            spikes=runner.intake.spikes if runner.intake.searched else None,
             loss={
                 "samples": proof.samples if proof else None,
                 "spikes": proof.spikes if proof else None,

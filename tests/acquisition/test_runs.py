@@ -121,7 +121,7 @@ def test_V_K_is_acquired_for_spikes_even_where_it_is_not_stored(run_scene, short
 
 def test_V_C1_alone_searches_no_spikes_and_opens_one_channel(run_scene, short):
     ran = run_scene(*short, 'record.signals=["V_C1"]')
-    assert ran.done.spikes == 0
+    assert ran.done.spikes is None
     with ran.stored() as run:
         assert run.signals == ("V_C1",)
         assert run.detection is None

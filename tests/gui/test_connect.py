@@ -339,6 +339,7 @@ def test_a_person_reads_the_field_for_a_calibration(calibrating) -> None:
     lab.until(lambda: not session.busy)
     assert session.status.fault is None
     assert asked[:5] == pytest.approx([1.0, 0.5, 0.0, -0.5, -1.0])
+    assert lab.window.screen_.ending.endswith("spikes not looked for")
     with Run.load(session.run.folder) as run:
         assert run.field["field"] == pytest.approx([10.8e-3 * i for i in asked])
     assert card.isHidden() and session.coil_view().verified_off

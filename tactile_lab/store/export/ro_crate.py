@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tactile_lab.errors import RunFolderError
-from tactile_lab.quantity import count
+from tactile_lab.quantity import looked_for
 from tactile_lab.signals import SIGNALS
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
@@ -119,9 +119,8 @@ def crate(run: Run) -> dict[str, Any]:
         "name": "Tactile Lab",
         "version": str((info.get("environment") or {}).get("tactile-lab", "")),
     }
-    spikes = "spikes not looked for"
-    if run.detection is not None:
-        spikes = count(len(run.table("spikes")), "spike")
+    found = None if run.detection is None else len(run.table("spikes"))
+    spikes = looked_for(found, "spike")
     dataset: Entity = {
         "@id": "./",
         "@type": "Dataset",
