@@ -91,7 +91,7 @@ def _slope(run: Measurement) -> Conclusion:
         and t.response.peak_rate is not None
     ]  # fmt: skip
     if run.circuit is None or not rated:
-        why = "No slope: no force made the sensor fire twice within a hold."
+        why = "No slope: at no force were two spikes detected within a hold."
         return Conclusion((), {"slopes": None}, (why,))
     trains = []
     for t in rated:

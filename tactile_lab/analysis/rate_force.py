@@ -212,7 +212,7 @@ def onset(forces: Sequence[float], spikes: Sequence[int]) -> Bracket:
     fired = np.array(spikes) > 0
     levels = np.array(forces, dtype=np.float64)
     if not fired.any():
-        raise NotIdentifiableError("none of these forces made the sensor fire")
+        raise NotIdentifiableError("no spike was detected at any of these forces")
     if fired.all():
         raise NotIdentifiableError("every force made the sensor fire")
     lowest = float(levels[fired].min())
