@@ -302,6 +302,7 @@ class Window(QMainWindow):
         session.source_changed.connect(self.screen_.follow_run)
         session.run.trial_ended.connect(self.screen_.trial_ended)
         session.run.ended.connect(self.screen_.run_ended)
+        session.run.lost.connect(self.screen_.run_lost)
         session.run.reported.connect(self.screen_.reported)
         self.header.stop.clicked.connect(lambda: session.stop())
         self.banner.acknowledged.connect(session.acknowledge)

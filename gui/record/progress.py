@@ -13,7 +13,7 @@ from gui.look.theme import Theme
 from gui.parts import STRETCH, column, label, row
 from gui.state import Snapshot, WindowState, minutes
 
-ENDS = {"Complete": "green", "Aborted": "amber", "Faulted": "red"}
+ENDS = {"Complete": "green", "Aborted": "amber", "Faulted": "red", "Cut": "red"}
 """Colour of a run that is over, by the first word of how it ended."""
 
 

@@ -242,6 +242,7 @@ class Screen(QObject):
             steps = sum(not hold.pause for hold in holds)
             searched = expectation is None or expectation.needs.detect_on is not None
             self.results.begin(steps, fires=searched)
+            self.list_runs()
         else:
             self.results.clear()
         self.changed.emit()
@@ -265,6 +266,11 @@ class Screen(QObject):
             self._records.exchange(done.folder)
         QTimer.singleShot(LATER, self.list_runs)
         QTimer.singleShot(LATER, trim)
+
+    def run_lost(self) -> None:
+        """The engine died: the record is cut short, and whole once it is recovered."""
+        self.ending = f"Cut short · {self._panels.session.run.name}"
+        self.list_runs()
 
     def reported(self, folder: Path) -> None:
         """A report exists, and the twin has come to the end."""

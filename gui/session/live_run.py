@@ -65,6 +65,7 @@ class LiveRun(LiveTask):
     begun = Signal(object)
     trial_ended = Signal(object)
     ended = Signal(object)
+    lost = Signal()
     completed = Signal()
     reported = Signal(object)
 
@@ -192,6 +193,7 @@ class LiveRun(LiveTask):
             status.set_fault(*words)
         elif ending.state is events.RunState.LOST:
             status.lose_engine(kept=True)
+            self.lost.emit()
         elif isinstance(ending, Executed):
             status.coil.left(off)
             self._keep(ending)

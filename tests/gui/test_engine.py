@@ -13,8 +13,10 @@ import pytest
 from PySide6.QtWidgets import QApplication
 from served_source import Source
 
+from gui.look.theme import Theme
 from gui.session.session import Session
 from gui.state import CoilKnowledge, WindowState, truth
+from gui.window import Window
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.engine.commands import begin_manual, begin_run, hold, renew, stop
 from tactile_lab.engine.engine import Engine, Reply
@@ -74,13 +76,18 @@ def test_engine_that_dies_is_a_fault_with_the_coil_unknown(
     app: QApplication, tmp_path: Path, request_: Request
 ) -> None:
     session = Session(tmp_path / "runs", realtime=False)
+    window = Window(session, Theme("light"))
 
     def until(done: Callable[[], object]) -> None:
         end = time.monotonic() + LONGEST
         while not done():
             assert time.monotonic() < end, [line.text for line in session.log.lines]
+            app.processEvents()
             session.poll()
             time.sleep(0.005)
+
+    def listed() -> list[str]:
+        return [card.entry.status for card in window.review.runs.cards]
 
     def known() -> CoilKnowledge:
         return truth(session.state, session.coil_view())
@@ -91,16 +98,21 @@ def test_engine_that_dies_is_a_fault_with_the_coil_unknown(
     assert engine is not None and engine != os.getpid()
     session.start(request_, "long")
     until(lambda: known() is CoilKnowledge.LIVE)
+    until(lambda: listed() == ["running"])
     os.kill(engine, signal.SIGKILL)
     until(lambda: session.state is WindowState.FAULT)
     assert not session.busy
+    until(lambda: listed() == ["cut short"])
+    until(lambda: "Cut short" in window.centre.progress.text)
     assert known() is CoilKnowledge.UNKNOWN
     session.acknowledge()
     session.connect_bench("sim")
     until(lambda: session.state is WindowState.READY)
     assert session.link.pid != engine
     assert known() is CoilKnowledge.OFF
+    window.close()
     session.close()
+    window.deleteLater()
     assert not session.link.alive
     assert ended(tmp_path / "runs")["status"] == "running", "`recover` mends it"
 
