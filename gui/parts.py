@@ -163,7 +163,14 @@ class IconButton(QToolButton):
 
 
 class Combo(QComboBox):
-    """A list that drops down; the wheel scrolls what it stands in, never its value."""
+    """A list that drops down; the wheel scrolls what it stands in, never its value.
+
+    Nor does the wheel bring it the keyboard: the next letter would choose.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Leave the wheel to the page."""

@@ -178,3 +178,5 @@ def test_the_wheel_changes_no_choice(lab) -> None:
         lab.app.sendEvent(box, turned)
         assert not turned.isAccepted(), "the page scrolls"
     assert [box.currentText() for box in choices] == before
+    wheeled = Qt.FocusPolicy.WheelFocus
+    assert all(box.focusPolicy() != wheeled for box in choices), "nor the keyboard"
