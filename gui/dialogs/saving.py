@@ -190,6 +190,10 @@ def table(stack: LaneStack, title: str) -> str:
     source, view = stack.source, stack.view
     members, columns = source.members, []
     for row in stack.visible_rows():
+        if not row.lane.raster:
+            source.shown(row.lane, view.start, view.end, CSV_POINTS)
+    source.read_all()  # what that asked for: lanes are content with coarser samples
+    for row in stack.visible_rows():
         lane = row.lane
         if lane.raster:
             columns += _spikes(members, view)

@@ -82,6 +82,11 @@ class Comparison(Source):
         """Whether samples have arrived since this was last asked."""
         return any([member.source.take_fetched() for member in self.members])
 
+    def read_all(self) -> None:
+        """Of each run."""
+        for member in self.members:
+            member.source.read_all()
+
     def close(self) -> None:
         """Let go of all files."""
         for member in self.members:

@@ -115,6 +115,9 @@ class Source:
         """Whether samples have arrived since this was last asked."""
         return False
 
+    def read_all(self) -> None:
+        """Return when all samples that were asked for have been read."""
+
     def close(self) -> None:
         """Let go of files."""
 

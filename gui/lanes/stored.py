@@ -164,6 +164,11 @@ class RunSource(Source):
         self.fetched.clear()
         return arrived
 
+    def read_all(self) -> None:
+        """Return when all samples that were asked for have been read."""
+        while (reader := self._reader) is not None:
+            reader.join()
+
     def close(self) -> None:
         """Let go of the file, as soon as nobody reads in it."""
         with self._lock:

@@ -6,6 +6,7 @@ from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
 from PySide6.QtSvg import QSvgRenderer
 
+from gui.dialogs.saving import table, write_scene, write_view
 from gui.session.steps import of_run
 from tactile_lab.report.from_run import read
 
@@ -43,6 +44,8 @@ def test_a_run_that_has_ended_is_looked_at_from_its_record(lab) -> None:
     assert screen.run.model is not None, "the model does not blink"
     live = window.session.source
     window.centre.view.show_span(0.2, 0.001)
+    rows = table(window.centre.stack, "view").splitlines()
+    assert len(rows) > 150, "the samples of this view were read for it"
     lab.until(lambda: screen.run.trace("V_C2", 0.2, 0.201, 1000).time.size > 150)
     assert live.trace("V_C2", 0.2, 0.201, 1000).time.size < 10, "seen live: bins"
 
@@ -99,8 +102,6 @@ def test_dropped_scene_is_loaded_and_dropped_run_is_opened(lab) -> None:
 
 
 def test_view_is_exported(lab) -> None:
-    from gui.dialogs.saving import write_scene, write_view
-
     window, folder = lab.window, lab.folder
     for name in ("view.png", "view.svg", "VIEW.CSV", "view.csv"):
         write_view(window.panels, None, folder / name)
