@@ -75,6 +75,7 @@ class RunsView(QWidget):
         self._entries: list[RunSummary] = []
         self._listed = PAGE
         self._chosen: RunSummary | None = None
+        self._focused: Path | None = None
         self._current: Path | None = None
         self.search = line_edit(
             "Search runs", "Search names, notes, levels …  (Ctrl+F)"
@@ -178,8 +179,10 @@ class RunsView(QWidget):
         chosen = list(FILTERS.values())[max(self.filter.chosen, 0)]
         key, largest_first = list(ORDERS.values())[max(self.order.currentIndex(), 0)]
         ticked = {card.entry.folder for card in self.cards if card.tick.isChecked()}
-        focused = next((c.entry.folder for c in self.cards if c.hasFocus()), None)
-        if focused is not None:
+        having = (c.entry.folder for c in self.cards if c.hasFocus())
+        # read anew before the keyboard was back, it goes where it was to go
+        self._focused = next(having, self._focused if self.hasFocus() else None)
+        if self._focused is not None:
             self.setFocus()  # or Qt would give the keyboard to, and choose, another run
         empty(self._rows)
         self.cards = []
@@ -210,8 +213,8 @@ class RunsView(QWidget):
         self._count.setText(count(len(fitting), "run"))
         on_screen = next(filter(self._on_screen, listed), None)
         self._choose(self._chosen if self._chosen in listed else on_screen)
-        if focused is not None:
-            there = [card for card in self.cards if card.entry.folder == focused]
+        if self._focused is not None:
+            there = [one for one in self.cards if one.entry.folder == self._focused]
             to = next(iter(there or self.cards), None) or self.search
             QTimer.singleShot(0, to, to.setFocus)  # once it is on screen
 

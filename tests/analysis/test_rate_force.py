@@ -41,7 +41,11 @@ def test_onset_lies_between_the_last_silent_and_the_first_firing():
 
 @pytest.mark.parametrize(
     ("spikes", "message"),
-    [([0, 0], "none of these"), ([1, 2], "every force"), ([2, 0], "silent though")],
+    [
+        ([0, 0], "no spike was detected"),
+        ([1, 2], "every force"),
+        ([2, 0], "silent though"),
+    ],
 )
 def test_an_onset_that_is_not_there(spikes, message):
     with pytest.raises(NotIdentifiableError, match=message):
