@@ -125,8 +125,7 @@ runs that told none of theirs. "CPU" is of one run with all that it tells, the m
 
 Intervals that hold the truth more often than in 97 % hold a bound rather than a
 scatter, and the bound is seldom reached: half a code of a converter whose steps no
-noise smooths (V_GS of `wiring_check`, changes of I_DS), the step at which a search
-ended (V_GS of `threshold_search`). `wiring_check` says that its numbers are bounds. A
+noise smooths (V_GS of `wiring_check`, which says that its numbers are bounds). A
 field's band is of those that came from saturation, as both fields told here do: these
 lie at the edge of the core's loop.
 

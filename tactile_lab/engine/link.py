@@ -116,7 +116,7 @@ class Link:
         self._rest, self._used = rest, time.monotonic()
         self._separate, self._realtime, self._lost = separate, realtime, lost
         self._pipe: Connection | None = None
-        self._outbox: SimpleQueue[bytes | None] = SimpleQueue()
+        self._outbox: SimpleQueue[bytes | None]  # of the pipe that is open
         self._process: EngineProcess | threading.Thread | None = None
         self._tasks: dict[int, RemoteTask] = {}
         self._asked: dict[int, Callable[[Reply[Any]], None]] = {}

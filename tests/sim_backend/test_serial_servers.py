@@ -102,6 +102,7 @@ def test_plays_and_ends_safely(served):
     slew = coil.limits.slew
     # a set-point is taken at some time within its exchange
     assert fastest(source.changes[:played], coil.update_interval) <= slew
+    assert fastest(source.changes[played - 1 :], coil.update_interval) <= slew
     assert fastest(source.changes[played:], 0.0) <= slew
 
 

@@ -46,6 +46,8 @@ def killed_once(tmp_path_factory):
 @pytest.fixture
 def killed_run(killed_once, tmp_path):
     """Path of a copy, and acknowledged samples, of a run killed after so many."""
+    if sys.platform == "win32":
+        pytest.skip("SIGKILL is POSIX")
 
     def copied(after=150 * 1024):
         path, acknowledged = killed_once(after)
@@ -54,7 +56,6 @@ def killed_run(killed_once, tmp_path):
     return copied
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
 @pytest.mark.parametrize("after", [1024, 9 * 1024, 60 * 1024])
 def test_a_killed_run_keeps_all_but_the_block_in_flight(bench, killed_run, after):
     path, acknowledged = killed_run(after)
@@ -85,7 +86,6 @@ def test_a_killed_run_keeps_all_but_the_block_in_flight(bench, killed_run, after
         recover(path)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
 @pytest.mark.parametrize("byte", [3, 25, 33, 37, 200])
 def test_a_run_whose_ledger_is_damaged_is_recovered_from_its_file(killed_run, byte):
     path, acknowledged = killed_run()
@@ -96,7 +96,6 @@ def test_a_run_whose_ledger_is_damaged_is_recovered_from_its_file(killed_run, by
     assert (path / "ledger.bin").read_bytes() == ledger
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
 @pytest.mark.parametrize("after", [1024, 9 * 1024])
 def test_a_killed_run_without_a_ledger_is_recovered_from_its_file(
     bench, killed_run, after
@@ -115,7 +114,6 @@ def test_a_killed_run_without_a_ledger_is_recovered_from_its_file(
         assert after == 1024 or run.table("current").shape[0] > 0
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
 def test_a_run_whose_ledger_and_file_are_damaged_is_not_called_empty(killed_run):
     path, _ = killed_run()
     (path / "ledger.bin").unlink()
@@ -129,7 +127,6 @@ def test_a_run_whose_ledger_and_file_are_damaged_is_not_called_empty(killed_run)
     assert before == {f.name: f.read_bytes() for f in path.iterdir() if f.is_file()}
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
 def test_a_recovery_does_not_make_a_changed_run_json_good(killed_run):
     path, _ = killed_run()
     told = (path / "run.json").read_text()
@@ -139,7 +136,6 @@ def test_a_recovery_does_not_make_a_changed_run_json_good(killed_run):
     assert str(found).startswith("run.json: was changed before the run was recovered")
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
 def test_a_recovery_that_cannot_write_says_what_to_do(killed_run):
     path, acknowledged = killed_run()
     # neither written nor removed, as on a disk that may only be read
@@ -150,7 +146,6 @@ def test_a_recovery_that_cannot_write_says_what_to_do(killed_run):
     assert recover(path).samples >= acknowledged - 1024
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
 def test_one_damaged_entry_of_the_ledger_does_not_end_it(killed_run):
     path, acknowledged = killed_run()
     ledger = bytearray((path / "ledger.bin").read_bytes())
