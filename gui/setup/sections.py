@@ -126,6 +126,15 @@ class Sections(QWidget):
         """What stands in the fields, by table."""
         return {name: form.texts() for name, form in self.forms()}
 
+    def changed_texts(self) -> dict[str, dict[str, str]]:
+        """What stands in the fields that differ from what is usual, by table."""
+        return {name: form.changed_texts() for name, form in self.forms()}
+
+    def propose(self, texts: dict[str, dict[str, str]]) -> None:
+        """Put texts into fields; can be undone."""
+        for name, form in self.forms():
+            form.propose(texts.get(name, {}))
+
     def set_texts(self, texts: dict[str, dict[str, str]]) -> None:
         """Put texts into fields, without a trace in undo."""
         for name, form in self.forms():

@@ -11,12 +11,27 @@ from PySide6.QtCore import QObject, Signal
 from gui.session.queue import Queued
 from gui.session.session import Session
 from gui.setup.form import Form
-from gui.setup.sections import TITLES, Sections
+from gui.setup.sections import LASTING, TITLES, Sections
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Protocol
+
+
+@dataclass(frozen=True)
+class LeftForm:
+    """What stood in the form when another protocol was picked.
+
+    Attributes:
+        path: the scene it was opened from.
+        texts: of the protocol's fields.
+        tables: of the fields of its tables that differ from the usual.
+    """
+
+    path: str | None
+    texts: dict[str, str]
+    tables: dict[str, dict[str, str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +64,7 @@ class Subject(QObject):
         self._usual: Scene | None = None
         self._before = KeptForm(None, None, {}, None, {})
         self._taken_up: object = None
-        self._typed: dict[str, dict[str, str]] = {}
+        self._left: dict[str, LeftForm] = {}
         session.queue.changed.connect(self._mind_queue)
 
     def open(self, path: str | None, overrides: tuple[str, ...] = ()) -> None:
@@ -66,24 +81,25 @@ class Subject(QObject):
         self._fill(path, scene, words)
 
     def pick(self, path: str) -> None:
-        """Fill the form with a protocol's ready scene, and what was typed there last.
+        """Fill the form with a protocol's ready scene, or as that protocol was left.
 
         Raises:
-            SceneError: it cannot be used.
+            SceneError: it cannot be used; where the file it was left with is gone, the
+                ready scene is in the form.
         """
         self.open(path)
         kind = self._form.protocol
-        if kind is not None and kind.name in self._typed:
-            self._form.propose(self._typed[kind.name])
+        left = None if kind is None else self._left.pop(kind.name, None)
+        if left is not None:
+            if left.path != path:
+                self.open(left.path)
+            self._form.propose(left.texts)
+            self._tables.propose(left.tables)
 
     def follow_bench(self) -> None:
         """Another bench is connected: its limits and voltages are the usual ones."""
         if self.edited is None and self._usual is not None:
-            texts = self._tables.texts()
-            before = {
-                name: {key: texts[name][key] for key in form.changed_texts()}
-                for name, form in self._tables.forms()
-            }
+            before = self._tables.changed_texts()
             scene = self._on_bench(self.path)
             self._tables.show_scene(scene, scene)
             self._tables.set_texts(before)
@@ -114,12 +130,12 @@ class Subject(QObject):
         return self._form.texts(), self._tables.texts()
 
     def _remember(self) -> None:
-        """Keep what was typed for when its protocol is picked again."""
+        """Keep what stands in the form for when its protocol is picked again."""
         kind = self._form.protocol
         if kind is not None and self.edited is None:
-            self._typed.pop(kind.name, None)
-            if self._form.edits:
-                self._typed[kind.name] = self._form.texts()
+            tables = self._tables.changed_texts()
+            del tables[LASTING]  # as it is by then
+            self._left[kind.name] = LeftForm(self.path, self._form.texts(), tables)
 
     def _on_bench(self, path: str | None) -> Scene:
         """A scene as it is on the connected bench, or as it is where it cannot be."""

@@ -7,6 +7,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
 
 from gui.setup.fields import QuantityEdit
+from gui.setup.picker import scene_of
+from tactile_lab.errors import SceneError
 from tactile_lab.scene.tables import Conditions, Detect
 from tactile_lab.table import described
 
@@ -156,6 +158,40 @@ def test_what_was_typed_for_a_protocol_is_there_when_it_is_picked_again(
     assert form.texts() == typed
     form.edits.undo()
     assert form.texts() != typed, "which can be undone"
+
+
+def test_a_protocol_is_picked_again_as_it_was_left_file_and_tables_with_it(
+    lab, tables
+) -> None:
+    """100 kS/s of a scene file became the ready scene's 1 MS/s, and nobody was told."""
+    subject = lab.window.setup.subject
+    kind = lab.window.setup.form.protocol
+    file, before = subject.path, loaded(lab)
+    put(lab, "detect", "threshold", "3 V")
+    put(lab, "conditions", "operator", "Curie")
+    subject.pick("staircase")
+    assert loaded(lab).detect.threshold != 3.0, "that is another protocol's"
+    put(lab, "conditions", "operator", "Meitner")
+    subject.pick(scene_of(kind.name))
+    assert subject.path == file
+    again = loaded(lab)
+    assert (again.protocol, again.record) == (before.protocol, before.record)
+    assert again.detect.threshold == 3.0
+    assert again.conditions.operator == "Meitner", "who measures stays"
+
+
+def test_a_scene_whose_file_is_gone_is_told_where_its_protocol_is_picked_again(
+    lab, tables
+) -> None:
+    subject, kind = lab.window.setup.subject, lab.window.setup.form.protocol
+    mine = lab.folder / "mine.toml"
+    mine.write_text((lab.folder / "short.toml").read_text())
+    lab.window.screen_.open_scene(str(mine))
+    subject.pick("staircase")
+    mine.unlink()
+    with pytest.raises(SceneError, match=r"mine\.toml"):
+        subject.pick(scene_of(kind.name))
+    assert subject.path == scene_of(kind.name)
 
 
 def test_an_emptied_field_shows_its_default_and_means_it(lab, tables) -> None:
