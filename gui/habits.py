@@ -17,14 +17,7 @@ APART = 400
 
 
 class Habits(QObject):
-    """Sounds, watching the sensor, recent scenes, where runs are kept, the lanes.
-
-    Args:
-        session: what happens.
-        preferences: what is to follow.
-        screen: opens scenes, lists runs.
-        lanes: are found again as they were left.
-    """
+    """Sounds, watching the sensor, recent scenes, where runs are kept, the lanes."""
 
     def __init__(
         self,

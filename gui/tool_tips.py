@@ -13,11 +13,7 @@ LONGEST = 60
 
 
 class ToolTips(QObject):
-    """Shows the long ones of the whole program as paragraphs.
-
-    Args:
-        application: all of its tool tips.
-    """
+    """Shows the long ones of the whole program as paragraphs."""
 
     def __init__(self, application: QApplication) -> None:
         super().__init__(application)

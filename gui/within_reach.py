@@ -21,9 +21,6 @@ class WithinReach(QObject):
 
     STOP is in a window's upper right corner: a screen that is unplugged must not take
     it along.
-
-    Args:
-        application: its windows and screens.
     """
 
     def __init__(self, application: QApplication) -> None:

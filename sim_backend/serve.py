@@ -33,12 +33,7 @@ BACKLOG = 1000
 
 
 class CoilOnly(DrivenCoil):
-    """Coil and field without sensor or scope; safe for all threads.
-
-    Args:
-        magnet: field per current.
-        options: lags, heat and core of the electromagnet.
-    """
+    """Coil and field without sensor or scope; safe for all threads."""
 
     def __init__(self, magnet: Magnet, options: PlantOptions | None = None) -> None:
         super().__init__((options or PlantOptions()).electromagnet())

@@ -205,11 +205,6 @@ def row_teslameter(
 ) -> RowParser:
     """A simulated teslameter made from its row; it has neither range nor noise.
 
-    Args:
-        plant: the physics at the probe.
-        row: the dialect.
-        clock: the bench's time.
-
     Raises:
         SceneError: no answer can be made from one of its patterns.
     """

@@ -57,14 +57,7 @@ class LoadFault:
 
 
 class VoltagePanel:
-    """State of a simulated source of a voltage.
-
-    Args:
-        plant: what its terminals are connected to.
-        name: of the voltage.
-        clock: the bench's time.
-        seed: of the noise of its readings.
-    """
+    """State of a simulated source of a voltage."""
 
     clearing, reply_end, gap = b"\x03\x18", b"\n", 0.0
 
@@ -206,9 +199,6 @@ class Keithley2400(VoltagePanel):
 
 class RowVoltageSource(VoltagePanel):
     """A simulated source of a voltage made from its row.
-
-    Args:
-        row: the dialect; others as `VoltagePanel`.
 
     Raises:
         SceneError: no answer can be made from one of its patterns.

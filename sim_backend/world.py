@@ -15,12 +15,7 @@ from tactile_lab.scope import Channel
 
 
 class WiredInputs:
-    """The plant at the scope's inputs, as the bench file wires them.
-
-    Args:
-        plant: the physical world.
-        wiring: what is connected to which input.
-    """
+    """The plant at the scope's inputs, as the bench file wires them."""
 
     def __init__(self, plant: Plant, wiring: tuple[Channel, ...]) -> None:
         self._plant = plant

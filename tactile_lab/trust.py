@@ -29,12 +29,7 @@ def known_file() -> Path:
 
 
 def code_named(table: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
-    """Files of code that a scene names, itself or in its bench file.
-
-    Args:
-        table: what the scene file holds.
-        folder: in which it lies.
-    """
+    """Files of code that a scene names, itself or in its bench file."""
     found = [folder / name for name in _code(table)]
     bench = table.get("bench")
     file = bench.get("file") if isinstance(bench, dict) else None

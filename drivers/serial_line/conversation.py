@@ -39,10 +39,6 @@ class Conversation(Generic[D]):
     A question whose answer failed is asked once more after the link has resynchronised
     (questions and set-points may be repeated without harm).
 
-    Args:
-        link: the wire.
-        dialect: the row.
-
     Attributes:
         acted: when the last command is taken to have been acted on, clock time, s: as
             what came after it on the wire, its answer, set out.

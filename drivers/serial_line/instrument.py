@@ -17,11 +17,7 @@ W = TypeVar("W", bound=Conversation[Any])
 
 
 class SerialInstrument(Generic[W]):
-    """An instrument spoken to over one serial port.
-
-    Args:
-        wire: the conversation with it.
-    """
+    """An instrument spoken to over one serial port."""
 
     def __init__(self, wire: W) -> None:
         self._wire = wire

@@ -19,12 +19,7 @@ _MOST_CODE = 127
 
 
 class RecordReader:
-    """Asks for the samples of a record.
-
-    Args:
-        link: the wire.
-        dialect: the model's row.
-    """
+    """Asks for the samples of a record."""
 
     def __init__(self, link: UsbtmcLink, dialect: ScopeDialect) -> None:
         self._link = link

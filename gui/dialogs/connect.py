@@ -53,13 +53,7 @@ PAGE = 540
 
 
 class Connect(Overlay):
-    """Three pages and one file.
-
-    Args:
-        window: what is covered.
-        session: of the window; the pages watch what it runs.
-        theme: colours.
-    """
+    """Three pages and one file."""
 
     prepare_asked = Signal(str)
     """A shipped scene belongs into the form."""

@@ -35,9 +35,6 @@ PICTURE = 100
 class RunSource(Source):
     """A run on disk. Opening reads the pyramids: do that away from the window's thread.
 
-    Args:
-        path: folder of the run.
-
     Raises:
         RunFolderError: it cannot be read as a run.
 

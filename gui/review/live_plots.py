@@ -104,12 +104,7 @@ def rate_plot(
 def train_plot(
     trials: Sequence[MeasuredTrial], laws: Sequence[FittedRate] = ()
 ) -> Plot | None:
-    """The rate in the newest holds against the time since each began; None without.
-
-    Args:
-        trials: the steps so far.
-        laws: as they were fitted; dashed.
-    """
+    """The rate in the newest holds against the time since each began; None without."""
     series: list[Series] = []
     fitted = {one.step: one.law for one in laws}
     fired = [t for t in trials if t.hold and within(t.spike_times, t.hold).size > 1]

@@ -59,12 +59,6 @@ class ConnectedBench(QObject):
         request: a run that needs every instrument.
         field: as read on request since the instruments were last asked or used, T.
         reading: the field is being read.
-
-    Args:
-        link: to the engine.
-        status: of the window.
-        log: of the window.
-        free: whether nothing uses the bench.
     """
 
     ready = Signal()

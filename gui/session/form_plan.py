@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 class FormPlan(QObject):
     """Has what the form asks for planned.
 
-    Args:
-        planner: who plans just now.
-
     Attributes:
         request: that was planned last.
         expectation: None until it is computed.

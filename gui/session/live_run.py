@@ -39,9 +39,6 @@ LEVELS = {"info": Severity.INFO, "warning": Severity.WARNING, "error": Severity.
 class LiveRun(LiveTask):
     """One run at a time.
 
-    Args:
-        out: folder for run folders.
-
     Attributes:
         source: what is seen of it; None before its first word.
         request, title, expectation: what it was asked to do, its name and its plan.

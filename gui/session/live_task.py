@@ -25,11 +25,6 @@ P = ParamSpec("P")
 class LiveTask(QObject):
     """One task at a time, from its beginning to its end; nothing here blocks.
 
-    Args:
-        link: to the engine.
-        status: of the window.
-        log: of the window.
-
     Attributes:
         task: in the engine; None between two.
         coil: its state, as told last; None before the first word and after the end.

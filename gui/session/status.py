@@ -15,9 +15,6 @@ UNKNOWN = OffReport(False, None, "not verified")
 class Status(QObject):
     """Moved by whoever learns something; everything else follows it.
 
-    Args:
-        log: faults are logged.
-
     Attributes:
         state: of the window.
         fault: that nobody has acknowledged.

@@ -19,14 +19,7 @@ from tactile_lab.errors import TactileLabError
 
 
 class PresetButton(IconButton):
-    """A filled star while the form shows one of its protocol's presets.
-
-    Args:
-        theme: colours.
-        form: whose parameters are kept.
-        folder: where presets are kept.
-        request: what the form asks for.
-    """
+    """A filled star while the form shows one of its protocol's presets."""
 
     failed = Signal(str)
 

@@ -52,9 +52,6 @@ class Dots:
 class Film:
     """The spikes of an array on disk, read as they are looked at.
 
-    Args:
-        events: of the array.
-
     Attributes:
         stretch: time that one picture tells of, s.
         most: spikes of the fullest taxel in a stretch, of those that are not stuck.

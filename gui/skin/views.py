@@ -63,10 +63,6 @@ class MapView(View):
     What is dead has no colour and is crossed out, what is stuck is framed: shapes can
     be told apart without colours, and of the two tones of a frame one stands out from
     any colour of the map.
-
-    Args:
-        theme: of the window.
-        array: of the taxels.
     """
 
     def __init__(self, theme: Theme, array: Array) -> None:

@@ -70,13 +70,6 @@ def open_skin(path: Path, out: Path) -> Callable[[Theme, QWidget | None], SkinWi
 class SkinWindow(QWidget):
     """Map and raster of one array.
 
-    Args:
-        skin: what it is.
-        computing: tells its spikes.
-        theme: of the window.
-        parent: whose window it goes with.
-        warnings: about the skin, for people.
-
     Attributes:
         film: to be played; None while it is computed.
     """

@@ -72,11 +72,6 @@ class SimCoilSource(CoilPanel):
 class RowCoil(CoilPanel):
     """A simulated current source made from its row.
 
-    Args:
-        plant: the physics behind its terminals.
-        row: the dialect.
-        clock: the bench's time.
-
     Raises:
         SceneError: no answer can be made from one of its patterns.
     """

@@ -82,14 +82,7 @@ class RingPart:
 
 @dataclass
 class SimulatedPicoScope:
-    """The unit's state.
-
-    Args:
-        source: what lies at its inputs.
-        clock: the time it lives in.
-        make: what it is.
-        faults: what goes wrong, and when.
-    """
+    """The unit's state."""
 
     source: SampleSource
     clock: Clock

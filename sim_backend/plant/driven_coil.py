@@ -17,9 +17,6 @@ class DrivenCoil(ABC):
 
     Safe for all threads: one lock is around everything.
 
-    Args:
-        electromagnet: coil and core.
-
     Attributes:
         gain: current that the source adds for a voltage at its analogue input, A/V; 0
             where none is wired.

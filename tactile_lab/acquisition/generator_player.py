@@ -80,9 +80,6 @@ class GeneratorPlayer:
     def start(self, beat: Callable[[], None]) -> tuple[float, float]:
         """Have the points played; between which clock times they began, s.
 
-        Args:
-            beat: called meanwhile.
-
         Raises:
             NoReplyError: the scope's thread does not start them.
         """
@@ -100,11 +97,7 @@ class GeneratorPlayer:
         self._began, self.quiet = None, True
 
     def ramp_down(self, beat: Callable[[], None]) -> None:
-        """Take the current back to 0 A, as far as the scope still answers.
-
-        Args:
-            beat: called meanwhile.
-        """
+        """Take the current back to 0 A, as far as the scope still answers."""
         self._scope.do(self._ramp_down)
         self._wait(lambda: self.quiet, LONGEST_RAMP + BEAT, beat)
 

@@ -19,10 +19,6 @@ class ModelComparison:
 
     Each set-point is taken to act as the source begins to answer, and how far that may
     be off is said; the report puts it where the shunt saw it.
-
-    Args:
-        scene: what is run.
-        searched: whether spikes are looked for.
     """
 
     def __init__(self, scene: Scene, *, searched: bool) -> None:

@@ -24,11 +24,7 @@ T = TypeVar("T")
 
 
 class Prompt(Generic[T]):
-    """One thing a person is asked for, in a thread of its own.
-
-    Args:
-        work: asks and waits.
-    """
+    """One thing a person is asked for, in a thread of its own."""
 
     def __init__(self, work: Callable[[], T]) -> None:
         self._failure: Exception | None = None

@@ -38,18 +38,7 @@ class StopAskedError(Exception):
 
 
 class Pump:
-    """Moves what instruments deliver whenever the loop of a run waits for something.
-
-    Args:
-        program: what the run does.
-        clock: the bench's time.
-        instruments: their threads.
-        intake: takes the samples.
-        account: writes down what happens.
-        stop: asks for the end.
-        lease: renewed as long as this lives.
-        emit: is told what happens.
-    """
+    """Moves what instruments deliver whenever the loop of a run waits for something."""
 
     def __init__(
         self,

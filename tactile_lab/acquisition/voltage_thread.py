@@ -19,11 +19,6 @@ STEP_EVERY = 0.05
 class VoltageThread(InstrumentThread):
     """Owns the source of one voltage.
 
-    Args:
-        voltage: its name, such as V_GS.
-        source: that holds it.
-        clock: the bench's time.
-
     Attributes:
         wanted: what it is to hold, V; None before `hold`.
         left: how it was left; None while it is in use.

@@ -198,9 +198,6 @@ class Day:
     def page(self, notes: Mapping[str, str]) -> Path:
         """Write the page for the notebook.
 
-        Args:
-            notes: who and where.
-
         Raises:
             SceneError: it cannot be written.
         """

@@ -127,12 +127,6 @@ def tell_others(
 ) -> tuple[StatusServer | LslStreams, ...]:
     """Who tells other programs of runs until that stack is left; nobody unless asked.
 
-    Args:
-        status: address of `--status`.
-        live: kind of `--live`.
-        until: closes them.
-        signals: are told of a stop that another program asks for.
-
     Raises:
         SceneError: that is no address or cannot be listened at, or LSL is not there.
     """
@@ -324,10 +318,6 @@ def caught_up(folder: Path, *, no_report: bool) -> bool:
     """Do for a run that is complete what the program was killed before doing.
 
     Nothing that fails in here is more than told; False where a signal cut it short.
-
-    Args:
-        folder: of the run.
-        no_report: leave the report out.
     """
     with interrupted():
         try:

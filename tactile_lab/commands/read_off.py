@@ -18,11 +18,6 @@ def field_reader(
 ) -> AskedField | None:
     """Whoever tells what the teslameter shows; None where nobody does.
 
-    Args:
-        scene: its bench says what is expected.
-        person: at the terminal.
-        path: of a file with the readings.
-
     Raises:
         SceneError: the file does not fit the scene.
     """

@@ -35,15 +35,7 @@ def begin_run(
     *,
     publish: bool = False,
 ) -> Execution:
-    """Run a request into a folder in `out`; the model follows it.
-
-    Args:
-        served: the task it becomes.
-        request: what to run.
-        out: folder that run folders are put into.
-        notes: kept with the run.
-        publish: tell it by Lab Streaming Layer, too.
-    """
+    """Run a request into a folder in `out`; the model follows it."""
     from tactile_lab.acquisition.asked_field import AskedField
     from tactile_lab.engine.execution import Execution
 

@@ -66,9 +66,6 @@ ENVELOPES = tuple(
 class FollowedRun:
     """Where the telling of one run stands.
 
-    Args:
-        execution: whose newest samples are told.
-
     Attributes:
         zero: LSL's time of run time 0, s; NaN before the record begins.
         uncertainty: of that, s.

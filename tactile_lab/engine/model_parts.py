@@ -48,9 +48,6 @@ class StoredParts:
     As in the report, levels are those read back, and their edges lie where the shunt
     saw them.
 
-    Args:
-        folder: of the run.
-
     Raises:
         RunFolderError, SceneError: it cannot be read.
         SolverError: the model cannot follow this force.

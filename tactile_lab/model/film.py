@@ -10,9 +10,6 @@ from tactile_lab.waveform import Waveform
 class Film:
     """What the film remembers of the forces so far; from rest at 0 s.
 
-    Args:
-        circuit: the sensor.
-
     Attributes:
         force: that it feels since the last waveform's end, N.
     """

@@ -43,13 +43,7 @@ class Column:
 
 
 class SampleColumn:
-    """One channel's codes with their checksums and pyramid, a chunk at a time.
-
-    Args:
-        file: with the channel declared.
-        signal: its name.
-        ledger: where each chunk is noted.
-    """
+    """One channel's codes with their checksums and pyramid, a chunk at a time."""
 
     def __init__(
         self, file: h5py.File, signal: str, ledger: Ledger | None = None

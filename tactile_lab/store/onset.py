@@ -13,10 +13,6 @@ from tactile_lab.waveform import Waveform
 def onsets(run: StoredRun, trials: Records) -> list[float | None]:
     """Of each trial, s from its start; None where the force applied stands still.
 
-    Args:
-        run: that they are of.
-        trials: rows of its trials.
-
     Raises:
         SceneError: the run's scene cannot be read any more.
     """

@@ -223,12 +223,6 @@ def _fill(
 ) -> tuple[int, int]:
     """Put what was written and can be read into `file`.
 
-    Args:
-        file: as it was declared.
-        written: what the ledger says.
-        killed: the file as the crash left it.
-        progress: told as chunks are put.
-
     Returns:
         Samples per channel, and samples dropped.
     """

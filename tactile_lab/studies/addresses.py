@@ -47,12 +47,7 @@ class Group(NamedTuple):
 
 
 class Axes:
-    """The axes of a study, those that are numbers of its sensor apart from the others.
-
-    Args:
-        axes: of the study.
-        scene: what they vary.
-    """
+    """The axes of a study: those of its sensor's numbers, and the others."""
 
     def __init__(self, axes: Sequence[Axis], scene: Scene) -> None:
         self.sensor = {

@@ -40,14 +40,7 @@ SHARE = 20
 
 
 class LiveStudy:
-    """Writes what is known of a study that is computed.
-
-    Args:
-        study: which.
-        shelf: of finished points.
-        named: their addresses.
-        folder: of the study.
-    """
+    """Writes what is known of a study that is computed."""
 
     def __init__(
         self, study: Study, shelf: Shelf, named: NDArray[np.void], folder: Path

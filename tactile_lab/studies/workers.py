@@ -68,12 +68,7 @@ class Workers(Protocol):
 
 
 class InProcess:
-    """This process, one point after another: what real instruments need.
-
-    Args:
-        points: computes them.
-        shelf: where they are put.
-    """
+    """This process, one point after another: what real instruments need."""
 
     count = 1
 
