@@ -18,7 +18,7 @@ from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.tokens import LIGHT, Tokens
 from gui.plots.axis import guarded
-from gui.plots.numbers import decimals, number, numbers
+from gui.plots.numbers import decimals, multiples, number, value_ticks
 from tactile_lab.trace import Trace
 
 AXIS = 52
@@ -38,6 +38,9 @@ LETTERS = 11
 
 BESIDE = 80
 """Pixels between the cursors from which on their times stand below their lines."""
+
+LAST = 15
+"""Pixels at the right end in which no number has room beside the name of the axis."""
 
 TIME_AXIS = 22
 """Height of the time axis below the last lane, px."""
@@ -230,12 +233,17 @@ def round_times(view: TimeView, frame: Frame) -> list[tuple[float, str, bool]]:
         wide = paint.width_of(words) + 6
         if frame.left <= x <= frame.right:
             taken.append((x - side * wide, x + (1 - side) * wide))
+    room = frame.right - frame.left
+    end = frame.start + view.width * (1 - LAST / room)
+    # of those that are told, not of all: one alone says nothing of the scale
+    step, _ = value_ticks(max(frame.start, 0.0), end, max(2, int(room / 90)))
     found = []
-    most = max(2, int((frame.right - frame.left) / 90))
-    for value, words in numbers(frame.start, frame.end, most):
+    for value in multiples(step, frame.start, frame.end):
+        words = number(value, decimals(step))
         x, half = round(frame.x1(value)) + 0.5, paint.width_of(words) / 2
         free = all(x + half < left or x - half > right for left, right in taken)
-        found.append((x, words, free and value >= -1e-12 and x < frame.right - 14))
+        inside = value >= -1e-12 and x < frame.right - LAST + 1
+        found.append((x, words, free and inside))
     return found
 
 

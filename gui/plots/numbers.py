@@ -24,7 +24,11 @@ def step_of(span: float, at_most: int) -> float:
 
 def ticks(low: float, high: float, at_most: int) -> list[float]:
     """Round values in [low, high], ascending."""
-    step = step_of(high - low, at_most)
+    return multiples(step_of(high - low, at_most), low, high)
+
+
+def multiples(step: float, low: float, high: float) -> list[float]:
+    """Those of a step in [low, high], ascending."""
     first = math.ceil(low / step - 1e-9)
     last = math.floor(high / step + 1e-9)
     return [number * step for number in range(first, last + 1)]
@@ -54,12 +58,6 @@ def number(value: float, places: int) -> str:
     if float(text) == 0:
         text = text.replace("-", "")
     return printed(text)
-
-
-def numbers(low: float, high: float, at_most: int) -> list[tuple[float, str]]:
-    """Round values in [low, high], ascending, and how they are written on an axis."""
-    places = decimals(step_of(high - low, at_most))
-    return [(value, number(value, places)) for value in ticks(low, high, at_most)]
 
 
 def signed(value: float, places: int) -> str:

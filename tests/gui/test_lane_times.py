@@ -5,6 +5,7 @@ import pytest
 
 from gui.lanes import navigator
 from gui.lanes.expected import Preview, Stretch
+from gui.lanes.floor import AXIS, LaneContext, round_times
 from gui.lanes.live import LiveSource
 from gui.lanes.navigator import Navigator
 from gui.lanes.source import PlanSource
@@ -32,6 +33,19 @@ def test_back_and_forward_through_what_was_seen():
     assert view.start == 60.0, "a new way has no forward"
     view.back()
     assert view.start == 20.0
+
+
+@pytest.mark.parametrize("room", [250, 372, 1000])
+def test_the_time_axis_has_two_numbers_at_least(room: int) -> None:
+    """From 0.35 to 8.9 s it had 5 alone, which says nothing of the scale."""
+    view = TimeView()
+    stage = LaneContext(view, width=AXIS + room + 56, lanes=[(0.0, 300.0)])
+    view.set_now(100.0, 100.0)
+    for width in np.geomspace(1e-4, 120.0, 97):
+        for start in (-0.1 * width, 0.0, 0.35, 9.99):
+            view.show_span(start, width)
+            told = [words for _, words, seen in round_times(view, stage.whole()) if seen]
+            assert len(told) > 1, (start, width, told)
 
 
 def test_one_drag_is_one_step_back():
