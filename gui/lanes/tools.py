@@ -84,6 +84,7 @@ class Tools(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Leave out what there is no room for."""
         super().resizeEvent(event)
+        self.set_width(self.width())
         self._leave_out()
 
     def _leave_out(self) -> None:
@@ -196,7 +197,6 @@ class Tools(QWidget):
         """Times of A and B, their difference, and the mean rate between, as text."""
         cursors = self._view.cursors
         self.cursors.setChecked(cursors is not None)
-        self.set_width(self.width())
         if cursors is None:
             self.readout.setText("")
             return

@@ -19,6 +19,7 @@ from gui.dialogs.connect import Connect
 from gui.dialogs.help import Help
 from gui.dialogs.preferring import PreferencesCard
 from gui.dialogs.studies import StudiesCard
+from gui.lanes.tools import Tools
 from gui.look.theme import Theme
 from gui.record.monitor_bar import MonitorBar
 from gui.screen.centre import EmptyCard
@@ -105,6 +106,17 @@ def host(app):
     made.show()
     yield made
     made.close()
+
+
+def test_the_tools_that_fit_are_there_from_the_start(app, host, stack) -> None:
+    """They were left out for the words beside others, which are not shown there."""
+    host.resize(646, 60)
+    tools = Tools(stack, stack.view, Theme("light"))
+    tools.setParent(host)
+    tools.setGeometry(0, 0, 646, 50)
+    tools.show()
+    for one in (tools.fit, tools.zoom, tools.export, tools.help):
+        assert one.isVisible(), one.accessibleName()
 
 
 def lay(app, bar: QWidget) -> None:
