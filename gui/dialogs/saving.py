@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from gui.screen.panels import Panels
     from gui.screen.screen import Screen
 
-TITLE = 34
+TITLE, LEGEND = 34, 20
+"""Heights of the title, and of the names of several runs below it, px."""
+
 CSV_POINTS = 20_000
 
 
@@ -129,7 +131,12 @@ def _svg(stack: LaneStack, title: str) -> bytes:
 
 def _size(stack: LaneStack) -> QSize:
     scene = stack.scene
-    return QSize(CARD + scene.width(), TITLE + scene.height())
+    return QSize(CARD + scene.width(), _above(stack) + scene.height())
+
+
+def _above(stack: LaneStack) -> int:
+    """Height of what stands above the lanes, px."""
+    return TITLE + (LEGEND if len(stack.source.members) > 1 else 0)
 
 
 def _draw(painter: QPainter, stack: LaneStack, title: str, size: QSize) -> None:
@@ -138,31 +145,26 @@ def _draw(painter: QPainter, stack: LaneStack, title: str, size: QSize) -> None:
     painter.setFont(sized(14, QFont.Weight.DemiBold))
     painter.drawText(QRectF(12, 6, size.width() - 24, 22), title)
     if len(stack.source.members) > 1:
-        _legend(painter, stack.source, tokens, size.width() - 12)
-    scene = stack.scene
-    lanes = QRectF(CARD, TITLE, scene.width(), scene.height())
+        _legend(painter, stack.source, tokens, size.width() - 24)
+    scene, above = stack.scene, _above(stack)
+    lanes = QRectF(CARD, above, scene.width(), scene.height())
     scene.draw_onto(painter, lanes, tokens)
     for row in stack.visible_rows():
         painter.save()
-        painter.translate(0, TITLE + row.card.y())
+        painter.translate(0, above + row.card.y())
         _card(painter, row, len(stack.source.members) > 1, tokens)
         painter.restore()
 
 
-def _legend(painter: QPainter, source: Source, tokens: Tokens, right: int) -> None:
-    """Marker and name of each run, as far as there is room beside the title."""
-    each, metrics = right // (len(source.members) + 1), painter.fontMetrics()
-    full = [f"{m} {one.name}" for m, one in zip(MARKS, source.members, strict=False)]
-    end = Qt.TextElideMode.ElideRight
-    names = [metrics.elidedText(name, end, each) for name in full]
-    for name, colour in zip(
-        reversed(names), reversed(tokens.runs[: len(names)]), strict=True
-    ):
-        width = metrics.horizontalAdvance(name)
+def _legend(painter: QPainter, source: Source, tokens: Tokens, room: int) -> None:
+    """Marker and name of each run below the title, each with its share of the room."""
+    each, metrics = room // len(source.members), painter.fontMetrics()
+    left, end = 12, Qt.TextElideMode.ElideRight
+    for mark, one, colour in zip(MARKS, source.members, tokens.runs, strict=False):
+        name = metrics.elidedText(f"{mark} {one.name}", end, each - 16)
         painter.setPen(QColor(colour))
-        right -= width
-        painter.drawText(QRectF(right, 6, width + 2, 22), name)
-        right -= 16
+        painter.drawText(QRectF(left, TITLE - 6, each, 22), name)
+        left += metrics.horizontalAdvance(name) + 16
 
 
 def _card(painter: QPainter, row: LaneRow, grey: bool, tokens: Tokens) -> None:

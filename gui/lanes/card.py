@@ -265,8 +265,10 @@ class LaneCard(QFrame):
         tall = self.height() >= TITLE + LINE * len(values)
         told = tall or changes is None
         unit = f"{self.lane.unit} {where}" if told else f"Δ {self.lane.unit}"
-        self._beside.setText(unit.strip())
-        self._more.setVisible(self.height() >= TITLE + LINE - 3)
+        below = self.height() >= TITLE + LINE - 3
+        counted = self.lane.raster and not below  # a few figures: they fit beside
+        self._beside.setText(self._counts(values) if counted else unit.strip())
+        self._more.setVisible(below)
         for places in range(self.lane.places, -1, -1):
             lines = self._lines(values, changes, places)
             if not tall:
@@ -287,6 +289,14 @@ class LaneCard(QFrame):
         ]
         rows = "</tr><tr>".join(cells) if tall else "".join(cells)
         return f'<table cellspacing="0" cellpadding="0"><tr>{rows}</tr></table>'
+
+    def _counts(self, values: Values) -> str:
+        """Of each run, in its colour, for one line."""
+        runs = zip(MARKS, self._theme.tokens.runs, values, strict=False)
+        return " &nbsp;".join(
+            f'<span style="color:{colour}">{mark}</span> <b>{self._text(value)}</b>'
+            for mark, colour, value in runs
+        )
 
     def _text(self, value: float | None, places: int | None = None) -> str:
         if value is None:

@@ -19,12 +19,14 @@ from PySide6.QtGui import (
 
 from gui.lanes import paint
 from gui.lanes.card import CARD
+from gui.lanes.compare import MARKS
 from gui.lanes.floor import AXIS, GUTTER
 from gui.lanes.source import Source
 from gui.lanes.view import TimeView
 from gui.look.fonts import sized
 from gui.look.theme import Theme
 from gui.plots.axis import RoundAxis, stroke
+from tactile_lab.trace import Trace
 
 HEIGHT, FOOT = 62, 20
 """Of all, and of the numbers below, px."""
@@ -53,10 +55,12 @@ class Navigator(pg.GraphicsView):  # type: ignore[misc]
         self._axis = RoundAxis("bottom", 80)
         self._axis.linkToView(self._box)
         self._plan, self._force = pg.PlotCurveItem(), pg.PlotCurveItem(fillLevel=0.0)
+        self._others = [pg.PlotCurveItem() for _ in MARKS[1:]]
         self._rate = pg.ScatterPlotItem(size=3, symbol="s", pen=None)
         self.window_ = pg.LinearRegionItem()
         self.window_.sigRegionChanged.connect(self._dragged)
-        for item in (self._plan, self._force, self._rate, self.window_):
+        traces = self._plan, self._force, *self._others
+        for item in (*traces, self._rate, self.window_):
             self._box.addItem(item, ignoreBounds=True)
         title, hint = pg.TextItem("Whole run"), pg.TextItem("drag · wheel zooms")
         title.setFont(sized(13, QFont.Weight.DemiBold))
@@ -85,7 +89,8 @@ class Navigator(pg.GraphicsView):  # type: ignore[misc]
         """
         source, view, now = self.source, self._view, monotonic()
         grown = None if source.running else (source.reach, source.spikes.size)
-        of = (source, grown, self.width())
+        shifts = tuple(run.shift for run in source.members)
+        of = (source, grown, shifts, self.width())
         due = of != self._run_of or (source.running and now > self._run_until)
         if due:
             self._run_of, self._run_until = of, now + GROWS
@@ -99,17 +104,34 @@ class Navigator(pg.GraphicsView):  # type: ignore[misc]
             self.window_.blockSignals(False)
 
     def _show_run(self) -> None:
-        """Outline of the force, planned and measured, and the rate, each up to 1."""
+        """Outline of the force, planned and measured, and the rate, each up to 1.
+
+        Of several runs the force of each, in the colour of the run.
+        """
         source, count = self.source, max(50, int(self._box.width()))
-        measured = source.trace("force", 0.0, source.length, count)
+        runs = source.members
+        forces = [
+            one.source.trace("force", -one.shift, source.length - one.shift, count)
+            for one in runs
+        ]
         planned, force = source.planned(0.0, source.length)
-        extent = () if measured.empty else measured.extent or ()
+        extents = [one.extent for one in forces if one.extent is not None]
         ends = [0.0, float(force.min(initial=0.0)), float(force.max(initial=0.0))]
-        peak = max(1e-12, *map(abs, [*ends, *extent]))
-        lowest = min([*ends, *extent]) / peak  # a pull is drawn below the push
+        ends += [end for extent in extents for end in extent]
+        peak = max(1e-12, *map(abs, ends))
+        lowest = min(ends) / peak  # a pull is drawn below the push
         self._plan.setData(planned, force / peak)
-        self._force.setData(*paint.zigzag(measured.scaled(1 / peak)))
-        rate = source.trace("rate", 0.0, source.length, RATES)
+        drawn = [
+            one.scaled(1 / peak).shifted(run.shift)
+            for one, run in zip(forces, runs, strict=True)
+        ]
+        for curve in self._others:
+            curve.clear()
+        for curve, one in zip((self._force, *self._others), drawn, strict=False):
+            curve.setData(*paint.zigzag(one))
+        rate = Trace.nothing()
+        if len(runs) == 1:
+            rate = source.trace("rate", 0.0, source.length, RATES)
         top = 1.1 * max(float(rate.high.max(initial=0.0)), 1e-9)
         self._rate.setData(rate.time, rate.high / top)
         self._box.setRange(
@@ -117,17 +139,26 @@ class Navigator(pg.GraphicsView):  # type: ignore[misc]
             yRange=(1.05 * lowest, 1.05),
             padding=0,
         )
+        self._tint_force()
+
+    def _tint_force(self) -> None:
+        """Colour means the signal, or the run where there are several."""
+        tokens, several = self._theme.tokens, len(self.source.members) > 1
+        soft = QColor(tokens.force)
+        soft.setAlpha(0 if several else 38)
+        self._force.setBrush(soft)
+        colours = tokens.runs if several else (tokens.force, *tokens.runs[1:])
+        curves = (self._force, *self._others)
+        for curve, colour in zip(curves, colours, strict=False):
+            curve.setPen(stroke(colour))
 
     def _tint(self) -> None:
         tokens = self._theme.tokens
         self.setBackground(tokens.sunken)
         self._axis.tint(tokens)
         self._axis.setPen(tokens.sunken)
-        soft = QColor(tokens.force)
-        soft.setAlpha(38)
         self._plan.setPen(stroke(tokens.border_strong))
-        self._force.setPen(stroke(tokens.force))
-        self._force.setBrush(soft)
+        self._tint_force()
         self._rate.setBrush(QColor(tokens.rate))
         inside = QColor(tokens.accent)
         inside.setAlpha(36)

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QToolTip, QWidget
 
 from gui.lanes.expected import Stretch
 from gui.look.theme import Theme
-from gui.parts import STRETCH, column, label, row
+from gui.parts import Elided, column, label, row
 from gui.state import Snapshot, WindowState, minutes
 
 ENDS = {"Complete": "green", "Aborted": "amber", "Faulted": "red", "Cut": "red"}
@@ -98,15 +98,15 @@ class ProgressStrip(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        self._left = label("No run", "")
+        self._left = Elided("No run")
         self._right = label("", "muted")
         self.blocks = Blocks(theme)
-        column(self, row(self._left, STRETCH, self._right), self.blocks)
+        column(self, row((self._left, 1), self._right), self.blocks)
 
     @property
     def text(self) -> str:
         """Both texts, for tests and screen readers."""
-        return f"{self._left.text()} | {self._right.text()}"
+        return f"{self._left.whole} | {self._right.text()}"
 
     def show_run(
         self,
@@ -128,7 +128,7 @@ class ProgressStrip(QWidget):
             self._running(snapshot, holds, length, reach, trial)
         else:
             colour = ENDS.get(ending.partition(" ")[0], colour)
-            self._left.setText(ending or "No run yet")
+            self._say(ending or "No run yet")
             shown = ending and kept
             self._right.setText(f"{reach:.1f} s kept" if shown else "")
         self.blocks.show_steps(list(holds), length, reach, colour)
@@ -143,14 +143,14 @@ class ProgressStrip(QWidget):
         trial: tuple[int, str] | None,
     ) -> None:
         if snapshot.state is WindowState.ABORTING:
-            self._left.setText("Stopping: the coil goes to 0 A and is read back")
+            self._say("Stopping: the coil goes to 0 A and is read back")
             self._right.setText(f"stopped at <b>{minutes(reach)}</b>")
             return
         if trial is None:
-            self._left.setText("Opening instruments")
+            self._say("Opening instruments")
         else:
             total = f" of {len(holds)}" if holds else ""
-            self._left.setText(f"Step <b>{trial[0] + 1}</b>{total} · <b>{trial[1]}</b>")
+            self._say(f"Step {trial[0] + 1}{total} · {trial[1]}")
         left = max(0.0, length - reach)
         share = 100 * reach / max(length, 1e-9)
         at = datetime.now() + timedelta(seconds=left)
@@ -158,3 +158,9 @@ class ProgressStrip(QWidget):
             f"{min(share, 100):.0f} % · elapsed <b>{minutes(reach)}</b> · remaining "
             f"<b>{minutes(left)}</b> · done at <b>{at:%H:%M:%S}</b>"
         )
+
+    def _say(self, text: str) -> None:
+        """On the left: what does not fit is in the tool tip, and widens nothing."""
+        if text != self._left.whole:
+            self._left.set_whole(text)
+            self._left.setToolTip(text)

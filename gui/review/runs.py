@@ -76,7 +76,7 @@ class RunsView(QWidget):
         self._listed = PAGE
         self._chosen: RunSummary | None = None
         self._focused: Path | None = None
-        self._current: Path | None = None
+        self._current: frozenset[Path] = frozenset()
         self.search = line_edit(
             "Search runs", "Search names, notes, levels …  (Ctrl+F)"
         )
@@ -125,10 +125,10 @@ class RunsView(QWidget):
                 self._chosen = self._entry(self._chosen.folder)
             self._show()
 
-    def show_current(self, folder: Path | None) -> None:
-        """Mark the run on screen; a file dialog names its folder in full."""
-        self._current = None if folder is None else folder.absolute()
-        self._choose(None if folder is None else self._entry(folder))
+    def show_current(self, *folders: Path) -> None:
+        """Mark the runs on screen; a file dialog names a folder in full."""
+        self._current = frozenset(folder.absolute() for folder in folders)
+        self._choose(self._entry(folders[0]) if folders else self._chosen)
 
     def newest(self, most: int) -> list[RunSummary]:
         """The newest runs of the folder that can be opened."""
@@ -258,7 +258,7 @@ class RunsView(QWidget):
                 card.thumbnail.show_thumbnail(self.thumbnails.of(folder))
 
     def _on_screen(self, entry: RunSummary) -> bool:
-        return entry.folder.absolute() == self._current
+        return entry.folder.absolute() in self._current
 
     def _choose(self, entry: RunSummary | None) -> None:
         self._chosen, first = entry, next(iter(self.cards), None)

@@ -201,6 +201,7 @@ class Screen(QObject):
     def leave_run(self) -> None:
         """Let go of what is from disk on screen."""
         self.results.forget()
+        self._panels.review.runs.show_current()
         if self._records.leave():
             self._panels.centre.compare_bar.show_comparison(None)
             self._panels.session.opened = ()
@@ -242,6 +243,8 @@ class Screen(QObject):
             steps = sum(not hold.pause for hold in holds)
             searched = expectation is None or expectation.needs.detect_on is not None
             self.results.begin(steps, fires=searched)
+            if session.run.folder is not None:
+                self._panels.review.runs.show_current(session.run.folder)
             self.list_runs()
         else:
             self.results.clear()
@@ -372,6 +375,8 @@ class Screen(QObject):
             return
         names = tuple(member.name for member in comparison.members)
         self._panels.session.opened = names
+        paths = [one.source.path for one in comparison.members]
+        self._panels.review.runs.show_current(*filter(None, paths))
         self.results.clear()
         self._panels.centre.compare_bar.show_comparison(comparison)
         self._panels.centre.show_source(comparison, self._lanes())

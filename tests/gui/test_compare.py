@@ -1,12 +1,16 @@
 """Two or three runs in the same lanes."""
 
+from itertools import product
 from typing import ClassVar
 
 import numpy as np
 import pytest
 from lane_stack import box, settle
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QLabel
 
-from gui.dialogs.saving import table
+from gui.dialogs.saving import LEGEND, TITLE, picture, table
+from gui.lanes.card import CARD, LaneCard
 from gui.lanes.compare import Comparison, ComparisonRows
 from gui.lanes.expected import Stretch
 from gui.lanes.floor import AXIS
@@ -142,6 +146,48 @@ def test_a_rate_without_another_is_seen(app, stack) -> None:
     assert Theme("light").tokens.runs[1] in seen
 
 
+def colours(image: QImage, start: int, rows: int) -> set[str]:
+    """Those of all pixels from a column on, in the uppermost rows."""
+    places = range(start, image.width()), range(rows)
+    return {image.pixelColor(x, y).name().upper() for x, y in product(*places)}
+
+
+def test_the_whole_run_below_the_lanes_shows_each_of_several(
+    app, stack, comparison
+) -> None:
+    """It showed the first alone, in the colour of the force."""
+    runs = Theme("light").tokens.runs
+    for alone in (False, True):
+        stack.show_source(comparison.first if alone else comparison)
+        settle(app)
+        image = stack.navigator.grab().toImage()
+        seen = colours(image, CARD + AXIS, image.height())
+        assert (set(runs[1:]) <= seen) is not alone, alone
+
+
+def test_names_of_runs_stand_below_the_title_of_a_picture(
+    app, stack, comparison
+) -> None:
+    """They were written over it, so that neither could be read."""
+    stack.show_source(comparison)
+    settle(app)
+    image = picture(stack, "3 runs, slow channels less those of the reference", 1)
+    runs = set(Theme("light").tokens.runs)
+    assert not runs & colours(image, 0, TITLE - 8)
+    assert runs <= colours(image, 0, TITLE + LEGEND)
+
+
+def test_spikes_of_several_runs_are_counted_in_a_low_lane(app) -> None:
+    """It said "in view" and of nothing how many."""
+    card = LaneCard(LANES["spikes"], Theme("light"))
+    card.resize(CARD, 34)
+    card.show()
+    card.show_runs([12.0, 7.0], None, "in view")
+    said = " ".join(one.text() for one in card.findChildren(QLabel) if one.isVisible())
+    assert "12" in said and "7" in said
+    card.close()
+
+
 def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     window, session = lab.window, lab.session
     # the newest two: the list leaves out what other tests have run long before
@@ -165,6 +211,8 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     lab.until(lambda: window.centre.compare_bar.isVisible())
     comparison = window.screen_.run
     assert progress.text.startswith(f"Steps of ● {comparison.members[0].name}")
+    marked = [c for c in window.review.runs.cards if "on screen" in c.accessibleName()]
+    assert {c.entry.folder for c in marked} == two, "not the one opened before"
     keys = [row.lane.key for row in window.centre.stack.visible_rows()]
     assert "residual" not in keys, "the model is not compared"
     results = window.screen_.results

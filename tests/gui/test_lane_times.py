@@ -44,7 +44,9 @@ def test_the_time_axis_has_two_numbers_at_least(room: int) -> None:
     for width in np.geomspace(1e-4, 120.0, 97):
         for start in (-0.1 * width, 0.0, 0.35, 9.99):
             view.show_span(start, width)
-            told = [words for _, words, seen in round_times(view, stage.whole()) if seen]
+            told = [
+                words for _, words, seen in round_times(view, stage.whole()) if seen
+            ]
             assert len(told) > 1, (start, width, told)
 
 

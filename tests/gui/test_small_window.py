@@ -22,8 +22,10 @@ from gui.dialogs.studies import StudiesCard
 from gui.lanes.tools import Tools
 from gui.look.theme import Theme
 from gui.record.monitor_bar import MonitorBar
+from gui.record.progress import ProgressStrip
 from gui.screen.centre import EmptyCard
 from gui.screen.compare_bar import CompareBar
+from gui.state import Snapshot
 from tactile_lab.engine.sensor import SensorState
 
 SMALL, USUAL = QSize(853, 480) - FRAME, QSize(1720, 1080)
@@ -117,6 +119,15 @@ def test_the_tools_that_fit_are_there_from_the_start(app, host, stack) -> None:
     tools.show()
     for one in (tools.fit, tools.zoom, tools.export, tools.help):
         assert one.isVisible(), one.accessibleName()
+
+
+def test_what_is_said_of_a_run_widens_no_column(app) -> None:
+    """The steps of a comparison, named with all it differs in, took room of another."""
+    strip = ProgressStrip(Theme("light"))
+    words = "Steps of ● 21:19:41 sine_sweep · amplitude 50 mN; bias 0 N; cycles 2"
+    strip.show_run(Snapshot(), [], 5.0, 5.0, None, words)
+    assert strip.minimumSizeHint().width() < 200
+    assert strip.text.startswith(words), "whole for a screen reader"
 
 
 def lay(app, bar: QWidget) -> None:
