@@ -156,7 +156,7 @@ def _load_reader() -> None:
         for name in ("numpy.ma", "gui.lanes.stored"):
             importlib.import_module(name)
 
-    start(load, "load reader")
+    start(load, "load reader", finishes=True)
 
 
 def _close_on_signals(close: Callable[[], object]) -> None:

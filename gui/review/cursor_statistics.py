@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QTimer
 
@@ -10,7 +11,9 @@ from gui.lanes.stack import LaneStack
 from gui.session.session import Session
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.jobs import statistics_of_run
-from tactile_lab.store.statistics import SignalStatistics
+
+if TYPE_CHECKING:
+    from tactile_lab.store.statistics import SignalStatistics
 
 STILL = 150
 """Milliseconds for which the cursors stand still before samples are read."""

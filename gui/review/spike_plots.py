@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,7 +11,9 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.plot import Guide, Panel, Plot, Series
 from tactile_lab.quantity import count, show
 from tactile_lab.spikes.rate import NEVER, begins
-from tactile_lab.store.spike_shapes import SpikeShapes
+
+if TYPE_CHECKING:
+    from tactile_lab.store.spike_shapes import SpikeShapes
 
 MOST_BINS = 60
 """Most bins of the histogram."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PySide6.QtCore import QObject, QTimer
@@ -25,7 +26,9 @@ from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.jobs import shapes_of_run
 from tactile_lab.quantity import show
 from tactile_lab.spikes.rate import begins
-from tactile_lab.store.spike_shapes import SpikeShapes
+
+if TYPE_CHECKING:
+    from tactile_lab.store.spike_shapes import SpikeShapes
 
 LOOKED = 500
 """Milliseconds after which it is looked anew what there is to show."""

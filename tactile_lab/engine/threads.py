@@ -15,7 +15,8 @@ def start(
         work: what it does.
         name: of the thread.
         finishes: the program ends after it. What reads runs has to: cut off within
-            HDF5, it keeps HDF5's lock, and the program's end waits for that for ever.
+            HDF5, it keeps HDF5's lock, and the program's end waits for that for ever;
+            cut off while it is imported, the program ends in a crash.
     """
     thread = threading.Thread(target=work, name=name, daemon=not finishes)
     thread.start()

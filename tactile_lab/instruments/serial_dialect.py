@@ -59,7 +59,9 @@ Gap = Annotated[float, Unit("s", least=0.0, most=0.5)]
 class DialectTable(BaseModel):
     """A table of a dialect: frozen, unknown keys refused."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, defer_build=True
+    )
 
 
 class SerialSettings(DialectTable):

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from tactile_lab.scene.scene import Scene
 from tactile_lab.stimulus.force import ForceProtocol
-from tactile_lab.store.stored_run import Records, StoredRun
 from tactile_lab.waveform import Waveform
+
+if TYPE_CHECKING:  # the window counts from here before it has loaded what reads runs
+    from tactile_lab.store.stored_run import Records, StoredRun
 
 
 def onsets(run: StoredRun, trials: Records) -> list[float | None]:

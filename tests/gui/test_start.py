@@ -13,6 +13,7 @@ told = {}
 
 def watched(window, *rest):
     session = window.session
+    told["reads runs"] = [m for m in ("h5py", "scipy", "numba") if m in sys.modules]
     told["asked before it is shown"] = session.state is WindowState.CONNECTING
     begin(window, *rest)
     timer = QTimer(window)
@@ -53,6 +54,7 @@ def test_the_bench_is_asked_while_the_window_is_built(tmp_path):
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout.splitlines()[-1])
     assert told["asked before it is shown"]
+    assert told["reads runs"] == [], "loaded once the bench is ready"
     assert not told["collects in any thread"]
     assert told["loaded ahead"], "numpy would load it in a frame, at a step's end"
     assert told["log"][0].startswith("Asking the instruments of")
