@@ -217,10 +217,18 @@ class Actions(QObject):
         ]
 
     def _enter(self, forward: bool) -> None:
-        """Give the keyboard to a panel: fault, form, lanes, log, results, header."""
+        """Give the keyboard to a panel: fault, form, lanes, log, results, header.
+
+        To a new fault first, wherever the keyboard is.
+        """
         card, panels, active = self._card(), self.panels, QApplication.activeWindow()
         centre, faults = panels.centre, self.window.findChildren(Banner)
         parts = (*faults, panels.setup, centre.lanes, centre.record, panels.review)
+        new = [one for one in faults if one.isVisible() and not one.met]
+        if card is None and new and new[0].window() is active:
+            new[0].met = True
+            enter_next(new[:1], forward=True)
+            return
         shown = (*(parts if card is None else (card,)), panels.header)
         enter_next([one for one in shown if one.window() is active], forward=forward)
 

@@ -74,8 +74,8 @@ def main(
     chosen = Theme(theme)
     chosen.apply()
     settings = QSettings()
-    wishes = Preferences(settings, lab)
-    session = Session(out or wishes.folder)
+    wishes = Preferences(settings, lab, out)
+    session = Session(wishes.folder)
     session.run.notes = lab.notes if lab else {}
     session.run.reports, session.run.publish = wishes.reports, wishes.lsl
     wanted = bench or wishes.bench
@@ -85,7 +85,7 @@ def main(
         session.connect_bench(wanted)  # which answers while the window is built
     from gui.window import Window
 
-    window = Window(session, chosen, settings)
+    window = Window(session, chosen, settings, wishes)
     fit(window, window.screen().availableSize())
     window.show()
     _close_on_signals(lambda: window.leave() if window.session.busy else window.close())

@@ -12,7 +12,11 @@ from gui.state import FaultNotice
 
 
 class Banner(QFrame):
-    """Shown from the fault until it is acknowledged."""
+    """Shown from the fault until it is acknowledged.
+
+    Attributes:
+        met: whether a key has led to it since this fault.
+    """
 
     acknowledged = Signal()
     log_asked = Signal()
@@ -21,6 +25,8 @@ class Banner(QFrame):
         super().__init__()
         self.setProperty("role", "banner")
         self._theme = theme
+        self._fault: FaultNotice | None = None
+        self.met = False
         self._sign = QLabel()
         self._title = label("", "bannertitle", wrap=True)
         self._text = label("", "", wrap=True)
@@ -35,6 +41,8 @@ class Banner(QFrame):
 
     def show_fault(self, fault: FaultNotice | None) -> None:
         """Show a fault, or hide."""
+        self.met = self.met and fault == self._fault
+        self._fault = fault
         self.setVisible(fault is not None)
         if fault is not None:
             self._sign.setPixmap(pixmap("warning", self._theme.tokens.red, 26))

@@ -30,14 +30,19 @@ class Preferences(QObject):
     Args:
         settings: where they are kept; None keeps nothing.
         lab: what counts where nothing was chosen.
+        out: folder for runs that the command line names; it wins.
     """
 
     changed = Signal()
 
     def __init__(
-        self, settings: QSettings | None = None, lab: Lab | None = None
+        self,
+        settings: QSettings | None = None,
+        lab: Lab | None = None,
+        out: Path | None = None,
     ) -> None:
         super().__init__()
+        self._out = out
         self._lab = lab or Lab()
         self._settings = settings
         self._values = dict(DEFAULTS)
@@ -54,6 +59,11 @@ class Preferences(QObject):
 
     @property
     def folder(self) -> Path:
+        """For runs: of the command line, else as it was chosen, else the lab's."""
+        return self._out or self.chosen_folder
+
+    @property
+    def chosen_folder(self) -> Path:
         """For runs, where the command line names none."""
         return Path(self._values["folder"] or self._lab.runs)
 

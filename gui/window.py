@@ -58,17 +58,22 @@ class Window(QMainWindow):
         session: what runs behind the window.
         theme: colours.
         settings: where geometry is kept; None keeps nothing.
+        preferences: of the user; None for those in `settings`.
     """
 
     def __init__(
-        self, session: Session, theme: Theme, settings: QSettings | None = None
+        self,
+        session: Session,
+        theme: Theme,
+        settings: QSettings | None = None,
+        preferences: Preferences | None = None,
     ) -> None:
         super().__init__()
         self.setMinimumSize(*LEAST)
         self.setAcceptDrops(True)
         self.session, self.theme, self._settings = session, theme, settings
         theme.dress(self)
-        self.preferences = Preferences(settings)
+        self.preferences = preferences or Preferences(settings)
         self.page = QWidget()
         self.header = Header(theme)
         self.banner = Banner(theme)
@@ -302,7 +307,7 @@ class Window(QMainWindow):
         session.source_changed.connect(self.screen_.follow_run)
         session.run.trial_ended.connect(self.screen_.trial_ended)
         session.run.ended.connect(self.screen_.run_ended)
-        session.run.lost.connect(self.screen_.run_lost)
+        session.run.cut.connect(self.screen_.run_cut)
         session.run.reported.connect(self.screen_.reported)
         self.header.stop.clicked.connect(lambda: session.stop())
         self.banner.acknowledged.connect(session.acknowledge)

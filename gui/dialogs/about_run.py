@@ -223,9 +223,8 @@ def facts_of(folder: Path) -> str:
     info = read_info(folder)
     versions = (info.get("environment") or {}).items()
     said = [(name, _brief(value)) for name, value in versions]
-    state = (
-        f"{summary['status']}, {'simulated' if summary['simulated'] else 'measured'}"
-    )
+    kind = "simulated" if summary["simulated"] else "measured"
+    state = f"{summary['status'].capitalize()}, {kind}"
     return facts(state, found) + facts("Made with", said)
 
 

@@ -6,6 +6,7 @@ them, STOP stops them, their run folder is kept. The pages only watch.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -138,7 +139,8 @@ class Connect(Overlay):
             self._say("No bench is connected that the calibration could belong to.")
             return False
         try:
-            write_calibrated_bench(spec, calibration, path)
+            named = replace(spec, name=self.name.text().strip() or spec.name)
+            write_calibrated_bench(named, calibration, path)
         except TactileLabError as error:
             self._say(str(error))
             return False

@@ -71,7 +71,7 @@ class PreferencesCard(Overlay):
 
     def show_preferences(self) -> None:
         """Open the card."""
-        self.folder.setText(str(self._preferences.folder))
+        self.folder.setText(str(self._preferences.chosen_folder))
         self.bench.setText(self._preferences.chosen_bench)
         for key, switch in self.switches.items():
             switch.setChecked(getattr(self._preferences, key))

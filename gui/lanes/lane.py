@@ -43,6 +43,11 @@ class Lane:
     raster: bool = False
 
     @property
+    def name(self) -> str:
+        """The title as plain text, for menus."""
+        return self.title.replace("<sub>", "_").replace("</sub>", "")
+
+    @property
     def valued(self) -> bool:
         """Whether one value stands for it: on its card in large, and at its edge."""
         return not (self.raster or self.symmetric)

@@ -75,6 +75,11 @@ class LiveSource(Source):
         return max(planned, self.reach, 1.0)
 
     @property
+    def sampled(self) -> bool:
+        """Whether any samples have come: a run may do without a scope."""
+        return bool(self._pyramids)
+
+    @property
     def followed(self) -> float:
         """Where the twin has come to; without a twin the plan has to do, s."""
         return self.model.end or self.reach

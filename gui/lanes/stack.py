@@ -283,7 +283,7 @@ class LaneStack(QFrame):
         locked.setChecked(box.locked)
         automatic = menu.addAction("Automatic range", lambda: lock(False))
         automatic.setEnabled(box.locked)
-        menu.addAction(f"Hide {lane.plain}", lambda: self.hide_lane(lane.key, True))
+        menu.addAction(f"Hide {lane.name}", lambda: self.hide_lane(lane.key, True))
         place = menu.addMenu("Arrange")
         own = next(row for row in self.rows if row.lane is lane)
         for words, way in (("Move up", -1), ("Move down", 1)):

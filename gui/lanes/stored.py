@@ -15,7 +15,7 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.pyramid import FINE, Pyramid
-from tactile_lab.signals import AVERAGED
+from tactile_lab.signals import AVERAGED, BENCH_ONLY
 from tactile_lab.store.layout import BIN
 from tactile_lab.store.onset import onsets
 from tactile_lab.store.remarks import read_remarks
@@ -82,6 +82,11 @@ class RunSource(Source):
         self._lock = threading.Lock()
         self._closed = False
         self._reader: threading.Thread | None = None
+
+    @property
+    def has_sensor(self) -> bool:
+        """Whether it recorded what a model of the sensor can stand beside."""
+        return bool(set(self.signals) - BENCH_ONLY - {"force"})
 
     @property
     def loop(self) -> FloatArray:

@@ -187,7 +187,7 @@ class Tools(QWidget):
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         for row in self._stack.rows:
             key = row.lane.key
-            one = menu.addAction(row.lane.plain)
+            one = menu.addAction(row.lane.name)
             one.setCheckable(True)
             one.setChecked(not self._stack.is_hidden(key))
             one.toggled.connect(lambda on, key=key: self._stack.hide_lane(key, not on))

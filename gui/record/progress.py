@@ -13,7 +13,11 @@ from gui.look.theme import Theme
 from gui.parts import Elided, column, label, row
 from gui.state import Snapshot, WindowState, minutes
 
-ENDS = {"Complete": "green", "Aborted": "amber", "Faulted": "red", "Cut": "red"}
+ENDS = {
+    "Complete": "green",
+    "Aborted": "amber",
+    **dict.fromkeys(("Faulted", "Cut", "Broke"), "red"),
+}
 """Colour of a run that is over, by the first word of how it ended."""
 
 

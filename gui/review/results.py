@@ -58,6 +58,19 @@ HEAD, ROW = 52, 26
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
+NO_STEPS = (
+    "No steps yet. Rate, onset, slope and adaptation\n"
+    "are told here, step by step, as a run goes on."
+)
+NO_LEVELS = (
+    "These steps are no levels of force: what they give\n"
+    "is told by the report, at the end of the run."
+)
+NO_SPIKES = (
+    "Spikes are not looked for in this run: what it\n"
+    "gives is told by the report, at its end."
+)
+
 HEADINGS = ("Step", "Spikes", "First\nms", "Peak\nHz", "Final\nHz", "Fall\n%")
 
 
@@ -86,6 +99,7 @@ class ResultsView(QWidget):
         self._told: list[tuple[str, ...]] = []
         self._model: tuple[tuple[float, float], ...] = ()
         self._laws: tuple[FittedRate, ...] = ()
+        self._fires, self._loops = True, False
         self.drawn, self.against = Combo(), Combo()
         self.drawn.addItems(["rates", *COLUMNS])
         self.against.addItems(list(COLUMNS))
@@ -103,7 +117,6 @@ class ResultsView(QWidget):
         self.tables = label("", "", wrap=True)
         self.tables.setTextFormat(Qt.TextFormat.RichText)
         self.tables.hide()
-        self._fires, self._loops = True, False
         self.table = QTableWidget(0, len(HEADINGS))
         self._facts = panel("card")
         self._facts_text = label("", "", wrap=True)
@@ -158,6 +171,7 @@ class ResultsView(QWidget):
     def show_kind(self, *, fires: bool) -> None:
         """Say whether spikes are looked for: without them there are no rates."""
         self._fires, self._loops = fires, False
+        self._show_rates()
         self._arrange()
 
     def show_loop(self, loop: FloatArray) -> None:
@@ -184,22 +198,25 @@ class ResultsView(QWidget):
         self._arrange()
 
     def _show_rates(self) -> None:
-        self.plot.nothing = (
-            SILENT
-            if self._levelled
-            else "These steps are no levels of force: what they give\n"
-            "is told by the report, at the end of the run."
-            if self._steps
-            else "No steps yet. Rate, onset, slope and adaptation\n"
-            "are told here, step by step, as a run goes on."
-        )
+        self.plot.nothing = self._nothing
         y, x = self.drawn.currentText(), self.against.currentText()
-        self.plot.show_plot(
-            rate_plot(self._steps, self._model)
-            if (y, x) == ("rates", "force")
-            else column_plot(self._steps, y, x)
-        )
+        if not self._fires:
+            shown = None
+        elif (y, x) == ("rates", "force"):
+            shown = rate_plot(self._steps, self._model)
+        else:
+            shown = column_plot(self._steps, y, x)
+        self.plot.show_plot(shown)
         self.trains.show_plot(train_plot(self._steps, self._laws))
+
+    @property
+    def _nothing(self) -> str:
+        """What is said where no rates can be drawn."""
+        if not self._fires:
+            return NO_SPIKES
+        if self._levelled:
+            return SILENT
+        return NO_LEVELS if self._steps else NO_STEPS
 
     def _choose_columns(self) -> None:
         """Draw what was chosen; the rates of both kinds go with the force alone."""
@@ -219,7 +236,8 @@ class ResultsView(QWidget):
     def _arrange(self) -> None:
         rates = self._fires and not self._loops
         self.loop.setVisible(self._loops and not self.answers)
-        self.plot.setVisible(rates and not self.answers)
+        untold = self._fires or self.statements.isHidden()
+        self.plot.setVisible(untold and not self._loops and not self.answers)
         self.trains.setVisible(rates and self.trains.plot is not None)
         self.table.setVisible(rates and self._levelled)
         self._axes.setVisible(not self.table.isHidden() and not self.answers)

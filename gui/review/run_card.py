@@ -25,7 +25,7 @@ PILLS = {
     "cut short": ("Cut short", "pill-bad"),
     "data gone": ("Data gone", "pill-bad"),
     "recovered": ("Recovered", "pill-warn"),
-    "faulted": ("Fault", "pill-bad"),
+    "faulted": ("Faulted", "pill-bad"),
     "unreadable": ("Unreadable", "pill-bad"),
 }
 
@@ -68,7 +68,7 @@ class RunCard(QFrame):
         self.tick.toggled.connect(self.ticked)
         self._mark = label("")
         self._mark.setFixedWidth(14)
-        word, role = PILLS.get(entry.status, (entry.status, "pill"))
+        word, role = PILLS.get(entry.status, (entry.status.capitalize(), "pill"))
         star = "★ " if entry.starred else ""
         first = row((Elided(star + (entry.title or entry.name), "strong"), 1))
         first.addWidget(label(word, role), 0, Qt.AlignmentFlag.AlignVCenter)

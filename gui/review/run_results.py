@@ -64,6 +64,10 @@ class RunResults(QObject):
         """A run of so many steps begins; `fires`: its spikes are looked for."""
         self._empty(steps, fires=fires, running=True)
 
+    def plan(self, *, fires: bool) -> None:
+        """A run is planned, and none is on screen."""
+        self._view.show_kind(fires=fires)
+
     def clear(self) -> None:
         """Of what is on screen there is nothing to tell: it is no run, or several."""
         self._empty(0, fires=True, running=False)
@@ -85,10 +89,11 @@ class RunResults(QObject):
         self._whole = done.state is RunState.COMPLETE
         self._show(running=False)
         self._fit(source)
+        bare = source is not None and not source.sampled
         facts = [
             f"<b>{done.folder.name}</b>",
             done.off.text.partition(" | ")[0],
-            loss_text(done.loss),
+            loss_text({**done.loss, "produced": 0} if bare else done.loss),
         ]
         self._view.show_facts("<br>".join(filter(None, facts)), report=False)
 

@@ -120,7 +120,8 @@ class Records(QObject):
             source.close()
             return
         folder = source.path
-        if source.sets_voltages:  # the model alone has one for the whole run
+        # the model alone has one voltage for a whole run
+        if source.sets_voltages or not source.has_sensor:
             self._modelled(folder, Reply(None))
             return
         desk = self._session.desk

@@ -229,6 +229,7 @@ class Screen(QObject):
             source = PlanSource(expectation.preview)
             self._panels.centre.show_source(source, self._lanes())
             self._show_steps(source, "")
+            self.results.plan(fires=expectation.needs.detect_on is not None)
 
     def follow_run(self, source: LiveSource) -> None:
         """Show the run that begins."""
@@ -270,9 +271,9 @@ class Screen(QObject):
         QTimer.singleShot(LATER, self.list_runs)
         QTimer.singleShot(LATER, trim)
 
-    def run_lost(self) -> None:
-        """The engine died: the record is cut short, and whole once it is recovered."""
-        self.ending = f"Cut short · {self._panels.session.run.name}"
+    def run_cut(self, word: str) -> None:
+        """The engine died or the run broke: its record may have to be recovered."""
+        self.ending = f"{word} · {self._panels.session.run.name}"
         self.list_runs()
 
     def reported(self, folder: Path) -> None:
@@ -408,7 +409,10 @@ class Screen(QObject):
         self._panels.review.runs.show_entries(found)
         newest = found[:-5:-1]
         self._panels.centre.empty.show_recent(
-            [(f"{e.title} · {day(e.started)} · {e.status}", e.folder) for e in newest]
+            [
+                (f"{e.title} · {day(e.started)} · {e.status.capitalize()}", e.folder)
+                for e in newest
+            ]
         )
 
 

@@ -62,7 +62,8 @@ class LiveRun(LiveTask):
     begun = Signal(object)
     trial_ended = Signal(object)
     ended = Signal(object)
-    lost = Signal()
+    cut = Signal(str)
+    """It ended without its usual end; a word for that."""
     completed = Signal()
     reported = Signal(object)
 
@@ -190,13 +191,14 @@ class LiveRun(LiveTask):
             status.set_fault(*words)
         elif ending.state is events.RunState.LOST:
             status.lose_engine(kept=True)
-            self.lost.emit()
+            self.cut.emit("Cut short")
         elif isinstance(ending, Executed):
             status.coil.left(off)
             self._keep(ending)
         else:
             status.coil.left(off)
             status.set_fault("The run broke.", f"{ending.reason} {off.text}")
+            self.cut.emit("Broke")
 
     def _keep(self, done: Executed) -> None:
         status, off, folder = self._status, done.off, done.folder
@@ -205,7 +207,7 @@ class LiveRun(LiveTask):
         self._log.add(level, "safety", f"Coil: {off.text}", safety=True)
         words = f"{folder.name} {done.state}: {looked_for(done.spikes, 'spike')}"
         lost = done.loss.get("samples")
-        if lost is not None:
+        if lost is not None and self.source is not None and self.source.sampled:
             words += f", {lost} samples lost"
         self._log.add(Severity.INFO, "store", words)
         self.report(folder, follow=True)

@@ -239,8 +239,10 @@ def test_calibration_is_offered_and_used_by_the_bench(lab) -> None:
     )
     session.run.reported.emit(made)
     assert not dialog.calibration.use.isHidden()
+    dialog.name.setText("Bench by the door")
     assert dialog.use_calibration(made / "calibration.csv", lab.folder / "own.toml")
     lab.until(lambda: session.state is WindowState.READY)
+    assert session.bench.spec.name == "Bench by the door", "as its field says"
     magnet = session.bench.spec.magnet
     assert magnet.calibration is not None and abs(magnet.calibration.most - 1) < 1e-9
     assert "own-field.csv" in dialog.calibration.named.text()

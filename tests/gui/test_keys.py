@@ -53,8 +53,13 @@ def test_what_is_locked_leaves_the_keyboard_to_its_card(lab, window) -> None:
 
 def test_a_fault_is_reached_and_acknowledged(lab, window) -> None:
     lab.session.status.fault = FaultNotice("The source is silent.", "Look at it.")
+    window.setup.form.fields[0].setFocus()
     lab.session.status.enter(WindowState.FAULT)
-    assert press(lab, KEY.Key_F6) is window.banner.show_log
+    assert press(lab, KEY.Key_F6) is window.banner.show_log, "from the form, too"
+    assert window.setup.isAncestorOf(press(lab, KEY.Key_F6))
+    assert window.centre.isAncestorOf(press(lab, KEY.Key_F6)), "a fault read is left"
+    assert press(lab, KEY.Key_F6, HELD.ShiftModifier) is not window.banner.show_log
+    window.banner.show_log.setFocus()
     assert press(lab, KEY.Key_Tab) is window.banner.acknowledge
     press(lab, KEY.Key_Return)
     lab.until(lambda: lab.session.state is WindowState.READY)

@@ -1,7 +1,7 @@
 """What the menu of a lane does, and how lanes are arranged."""
 
 import pytest
-from lane_stack import box, choose, drag, middle, move, settle, shown
+from lane_stack import box, choose, drag, menu_of, middle, move, settle, shown
 from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QApplication
@@ -12,6 +12,18 @@ from gui.lanes.lane import lanes_for
 from gui.lanes.stack import LaneStack
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
+
+
+def test_the_menu_names_a_lane_as_its_card_does(app, stack) -> None:
+    """It offered "Hide Measured V_C1 less the model's"."""
+    stack.show_lanes(lanes_for(("V_C1",)))
+    settle(app)
+    for key, name in (("residual", "Residual"), ("V_C1", "V_C1")):
+        menu = menu_of(app, stack, middle(stack, key))
+        assert f"Hide {name}" in [one.text() for one in menu.actions()]
+        menu.close()
+        menu.deleteLater()
+        settle(app)
 
 
 def test_the_menu_of_a_lane(app, stack):

@@ -9,6 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QToolTip
 
 from gui.dialogs.preferring import PreferencesCard
+from gui.habits import Habits
 from gui.menu import GearMenu
 from gui.parts import Combo
 from gui.preferences import Preferences
@@ -52,6 +53,18 @@ def test_settings_act_at_once(lab) -> None:
     window.preferences.set(folder=str(out), lsl=False)
     assert not session.run.publish
     assert session.out == out
+
+
+def test_a_folder_that_the_command_line_names_wins(lab, kept: QSettings) -> None:
+    """Save moved the runs of a window that was started with --out."""
+    window, session = lab.window, lab.session
+    out, other = session.out, lab.folder / "chosen"
+    wishes = Preferences(kept, out=out)
+    habits = Habits(session, wishes, window.screen_, window.centre.stack)
+    wishes.set(folder=str(other))
+    assert session.out == out
+    assert wishes.chosen_folder == other, "as the page shows it, and the next start has"
+    habits.deleteLater()
 
 
 def test_the_sensor_is_watched_where_that_is_preferred(lab) -> None:

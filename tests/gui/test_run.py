@@ -17,7 +17,21 @@ from gui.lanes.source import PlanSource
 from gui.state import CoilKnowledge, WindowState, stop_text, truth
 from sim_backend.serial_line import wires as serial_wires
 from sim_backend.serial_line.faults import SerialFault
+from tactile_lab.acquisition.ending import Ending
+from tactile_lab.acquisition.events import RunState
+from tactile_lab.bench import OffReport
 from tactile_lab.waveform import Waveform
+
+FORCE = """
+[protocol]
+name = "pulses"
+levels = ["80 mN"]
+hold = "300 ms"
+rest = "100 ms"
+
+[record]
+signals = ["force"]
+"""
 
 
 def newest_coil() -> serial_wires.FarEnd:
@@ -66,6 +80,39 @@ def test_run_moves_lanes_and_gives_results(lab) -> None:
     assert [f.label for f in window.screen_.results.steps] == ["80 mN", "120 mN"]
     assert window.review.results.mark.text().startswith("final")
     lab.until(lambda: window.header.stop.truth is CoilKnowledge.OFF)
+
+
+def test_a_run_of_the_force_alone_claims_nothing_of_the_sensor(lab) -> None:
+    """Model was lit, 0 samples were lost, and the results were blank."""
+    window, session = lab.window, lab.session
+    scene = lab.folder / "force.toml"
+    scene.write_text(FORCE)
+    assert window.screen_.open_scene(str(scene))
+    session.plan.expectation = None
+    lab.until(lambda: session.plan.expectation is not None)
+    window.setup.run.click()
+    lab.until(lambda: session.state is WindowState.READY and not session.busy)
+    folder = session.run.folder
+    lab.until(lambda: getattr(window.screen_.run, "path", None) == folder)
+    lab.until(lambda: session.desk.idle)
+    window.frames.tick()
+    window.render_state()
+    assert not window.centre.tools.twin.isEnabled()
+    stored = [line.text for line in session.log.lines if line.source == "store"]
+    assert stored[-1].endswith("complete: spikes not looked for")
+    results = window.review.results
+    assert "0 samples" not in results._facts_text.text()
+    assert results.plot.isVisibleTo(results)
+    assert results.plot.nothing.startswith("Spikes are not looked for")
+
+
+def test_a_run_that_broke_is_not_no_run(lab) -> None:
+    """What broke is a fault of ours; the engine tells it as it tells any ending."""
+    off = OffReport(True, 0.0, "Output off, 0 A read back.")
+    lab.session.run.has_ended(Ending(RunState.FAULTED, off, "It broke. KeyError: 'a'"))
+    assert lab.window.screen_.ending == f"Broke · {lab.session.run.name}"
+    lab.session.acknowledge()
+    lab.until(lambda: lab.session.state is WindowState.READY)
 
 
 def test_stop_says_what_is_known_of_the_coil_in_the_same_frame(

@@ -10,7 +10,8 @@ from PySide6.QtWidgets import QApplication, QLabel, QPushButton
 import tactile_lab
 from gui.lanes.compare import MARKS
 from gui.look.theme import Theme
-from gui.review.run_card import differing
+from gui.record.progress import ENDS
+from gui.review.run_card import PILLS, differing
 from gui.review.runs import PAGE, RunsView
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.summary import RunSummary
@@ -42,6 +43,12 @@ def runs(app: QApplication) -> RunsView:
 
 def texts(view: RunsView) -> str:
     return " ".join(one.text() for one in view.findChildren(QLabel))
+
+
+def test_a_run_ended_in_one_word_in_the_list_and_below_the_lanes() -> None:
+    """A run that was Faulted below the lanes had a Fault in the list."""
+    words = {word for word, _ in PILLS.values()}
+    assert {"Complete", "Aborted", "Faulted"} <= words & ENDS.keys()
 
 
 def test_nothing_can_be_done_before_a_run_is_chosen(runs: RunsView) -> None:
