@@ -124,15 +124,20 @@ class Waveform:
         keep[1:-1] = (time[2:] != time[1:-1]) | (time[1:-1] != time[:-2])
         return cls(time[keep], value[keep])
 
-    @property
+    @cached_property
     def start(self) -> float:
         """Time of the first point, s."""
         return float(self.time[0])
 
-    @property
+    @cached_property
     def end(self) -> float:
         """Time of the last point, s."""
         return float(self.time[-1])
+
+    @cached_property
+    def first(self) -> float:
+        """Value at and before the first point."""
+        return float(self.value[0])
 
     @property
     def peak(self) -> float:

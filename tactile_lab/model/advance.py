@@ -10,7 +10,7 @@ from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import rest
 from tactile_lab.model.need import Need, checked_tolerance
 from tactile_lab.model.solution import Solution
-from tactile_lab.model.solver import solve
+from tactile_lab.model.solver import solve, start_from
 from tactile_lab.model.state import State
 from tactile_lab.waveform import Waveform
 
@@ -43,4 +43,5 @@ def advance(
             f"{state.time:g} s."
         )
     need = Need.of(keep, circuit.saturation)
-    return solve(circuit, state, force, until, need, checked_tolerance(tolerance))
+    start = start_from(circuit, state)
+    return solve(start, force, until, need, checked_tolerance(tolerance))

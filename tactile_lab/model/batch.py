@@ -13,7 +13,7 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.model import derived, kernel, packed, spiking
 from tactile_lab.model.circuit import LARGEST, LARGEST_VOLTAGE, SMALLEST, Circuit, units
 from tactile_lab.model.compiled import entry, inner, inner_making_arrays, source_stamp
-from tactile_lab.model.need import checked_tolerance
+from tactile_lab.model.need import INTEGRATOR, NODE_A, SPIKES, checked_tolerance
 from tactile_lab.model.rest_pair import rest_of_cascade
 from tactile_lab.model.solver import MOST_SPIKES
 from tactile_lab.model.state import Start
@@ -156,12 +156,13 @@ def numbers_of(c: Any, direct: bool, par: FloatArray) -> float:
 
 
 @inner
-def begun(V_P: float, y: float, v: float, S: FloatArray) -> None:
-    """Set the kernel's memory to these voltages, V, before the first spike."""
+def begun(V_P: float, y: float, v: float, force: float, S: FloatArray) -> None:
+    """Set the kernel's memory to these voltages, V, under `force` N, at 0 s."""
     for i in range(S.size):
         S[i] = kernel.FRESH[i]
     S[kernel.Y], S[spiking.VOLTAGE] = y, v
     S[kernel.V_P] = S[kernel.V_P_HIGHEST] = V_P
+    S[kernel.FORCE] = force
 
 
 @inner_making_arrays
@@ -189,12 +190,11 @@ def train(
         y, v = rest_of_cascade(par)
         if v >= c.fire_voltage:
             v = c.reset_voltage
-    begun(V_P, y, v, S)
-    status, spikes, _rows = kernel.run(
-        time, force, 0.0, force[0], until, k_F, par, S, tolerance, True, True,
-        keep_times, False, False, most,
+    begun(V_P, y, v, force[0], S)
+    return kernel.run(
+        time, force, until, k_F, par, S, tolerance,
+        NODE_A | INTEGRATOR | (SPIKES if keep_times else 0), most,
     )  # fmt: skip
-    return status, spikes
 
 
 def _build(stamp: int) -> tuple[Callable[..., Any], ...]:

@@ -24,7 +24,7 @@ COMPILED = (
     "kernel.py", "sampling.py", "transistor.py", "pair.py", "coupled.py",
     "rest_pair.py", "truncation.py", "threshold.py", "ellipse.py", "derived.py",
     "packed.py", "batch.py", "taylor.py", "elementary.py", "matrix.py",
-    "scratch.py",
+    "scratch.py", "need.py",
 )  # fmt: skip
 """Every file that machine code is made from."""
 # wrappers for calls from Python or C would double the time to compile

@@ -29,20 +29,16 @@ from tactile_lab.model.kernel import (
     ERRORS,
     EXPANSIONS,
     FAST,
-    FORCE,
     ITERATIONS,
     NOT_FINITE,
-    PIECE_ROW,
     PIECES,
     REJECTED,
     ROWS_0,
     ROWS_1,
     ROWS_2,
-    SEGMENT_ROW,
     SEGMENTS,
     SHARE,
     SHORTEST_SEGMENT,
-    STEP_ROW,
     STEPS,
     STRONG,
     STUCK,
@@ -53,9 +49,15 @@ from tactile_lab.model.kernel import (
     Y,
     largest_of,
     more_rows,
+    pieces_room,
     points_between,
+    segments_room,
+    spikes_room,
+    steps_room,
     stored,
+    wave_room,
 )
+from tactile_lab.model.need import DENSE, DENSE_V_C2, SPIKES
 from tactile_lab.model.node_a import (
     DIVIDER,
     LAMBDA,
@@ -152,30 +154,25 @@ def _build(stamp: int) -> Callable[..., Any]:
     def run(
         wave_time: FloatArray,
         wave: FloatArray,
-        start: float,
-        force_before: float,
         until: float,
         k_F: float,
         par: FloatArray,
         S: FloatArray,
         tolerance: float,
-        keep_spikes: bool,
-        keep_1: bool,
-        keep_2: bool,
+        asked: int,
         most: float,
     ) -> Any:
         _ = stamp
         status = DONE
-        time, force = points_between(wave_time, wave, start, force_before, until)
+        keep_spikes, keep_1 = asked & SPIKES != 0, asked & DENSE != 0
+        keep_2 = asked & DENSE_V_C2 != 0
         par, S = borrowed(par), borrowed(S)
+        time, force = points_between(wave_time, wave, until, wave_room(), S)
         E = S[ERRORS:]
-        S[FORCE] = force[-1]
         if not abs(k_F) * largest_of(force) <= LARGEST_VOLTAGE:
             status = STRONG
-        seg_rows = np.empty((8, SEGMENT_ROW))
-        step_rows = np.empty((16, STEP_ROW))
-        piece_rows = np.empty((16, PIECE_ROW))
-        spikes = np.empty(64)
+        seg_rows, step_rows, piece_rows = segments_room(), steps_room(), pieces_room()
+        spikes = spikes_room()
         W, matrix, right = nodes_room(), matrix_room(), right_room()
         f, g, m = flow_room(), flow_room(), flow_room()
         a, b, part, d = series_room(), series_room(), series_room(), series_room()
@@ -393,7 +390,8 @@ def _build(stamp: int) -> Callable[..., Any]:
             if status != DONE:
                 break
         S[Y_ERROR], S[ERROR] = math.sqrt(E[E_11]), math.sqrt(E[E_22])
-        return status, spikes, stored(seg_rows, step_rows, piece_rows, S)
+        count = int(S[COUNT]) if keep_spikes and status == DONE else 0
+        return status, stored(spikes, count, seg_rows, step_rows, piece_rows, S)
 
     return run
 

@@ -25,6 +25,7 @@ from tactile_lab.model.integrator import (
     series_at,
     to_series,
 )
+from tactile_lab.model.need import DENSE, DENSE_V_C2, INTEGRATOR, NODE_A, SPIKES
 from tactile_lab.model.node_a import (
     DIVIDER,
     LAMBDA,
@@ -69,9 +70,10 @@ KNEE = 12.0
 """From so many V_T down exp(-V_C1/V_T) bends V_C1."""
 SHORTEST_SEGMENT = 1e-290
 """A segment shorter than this is a jump, s."""
-Y, Y_ERROR, Y_LARGEST_ERROR, V_P, V_P_HIGHEST, FORCE = range(KNOWN, KNOWN + 6)
-"""What the memory `S` holds beside the integrator and its spikes: V_C1, V_P, force."""
-STEPS, ITERATIONS, REJECTED, SEGMENTS, PIECES, EXPANSIONS = range(FORCE + 1, FORCE + 7)
+Y, Y_ERROR, Y_LARGEST_ERROR, V_P, V_P_HIGHEST, FORCE, TIME = range(KNOWN, KNOWN + 7)
+"""What the memory `S` holds beside the integrator and its spikes: V_C1, V_P, and what
+the force, N, and the time, s, are where the slice begins, and then where it ends."""
+STEPS, ITERATIONS, REJECTED, SEGMENTS, PIECES, EXPANSIONS = range(TIME + 1, TIME + 7)
 ROWS_0, ROWS_1, ROWS_2, ERRORS = range(EXPANSIONS + 1, EXPANSIONS + 5)
 """Counters of work and of rows stored; from `ERRORS` on an `ellipse`, where V_C1 and
 V_C2 are solved together."""
@@ -85,6 +87,9 @@ nodes_room, matrix_room = room_for(ROWS), room_for(ORDER, ORDER)
 series_room, points_room = room_for(ORDER + 1), room_for(3 * (ORDER + 1))
 q_room, P_room = room_for(ORDER + 2), room_for(2 * MOST_TERMS + 2)
 fires_room, lanes_room = room_for(4), room_for(train.ROOM)
+wave_room, spikes_room = room_for(2, 32), room_for(256)
+segments_room, steps_room = room_for(8, SEGMENT_ROW), room_for(16, STEP_ROW)
+pieces_room = room_for(16, PIECE_ROW)
 
 
 @inner_making_arrays
@@ -101,13 +106,20 @@ def more_rows(rows: FloatArray, count: int) -> FloatArray:
 
 @inner_making_arrays
 def stored(
-    segments: FloatArray, steps: FloatArray, pieces: FloatArray, S: FloatArray
+    spikes: FloatArray,
+    count: int,
+    segments: FloatArray,
+    steps: FloatArray,
+    pieces: FloatArray,
+    S: FloatArray,
 ) -> FloatArray:
-    """The rows that are filled, one store after the other: one array to hand out."""
-    size = int(S[ROWS_0]) * SEGMENT_ROW
+    """`count` spikes, then the rows that are filled: one array to hand out."""
+    size = count + int(S[ROWS_0]) * SEGMENT_ROW
     size += int(S[ROWS_1]) * STEP_ROW + int(S[ROWS_2]) * PIECE_ROW
     whole = np.empty(size)
-    at = 0
+    for i in range(count):
+        whole[i] = spikes[i]
+    at = count
     for rows, count in (
         (segments, S[ROWS_0]), (steps, S[ROWS_1]), (pieces, S[ROWS_2])
     ):  # fmt: skip
@@ -143,19 +155,30 @@ def value_at(time: FloatArray, value: FloatArray, k: int, t: float) -> float:
 
 @inner_making_arrays
 def points_between(
-    time: FloatArray, value: FloatArray, start: float, force: float, until: float
+    time: FloatArray,
+    value: FloatArray,
+    until: float,
+    points: FloatArray,
+    S: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """The force from the state on: its own value, a jump to the waveform's, points."""
+    """The force from the state on: its own value, a jump to the waveform's, points.
+
+    They are put into `points`, if it is large enough. `S` then is that of `until`.
+    """
+    start, force = S[TIME], S[FORCE]
     first, stop = after(time, start), after(time, until)
     ends = stop > first and time[stop - 1] == until
     n = 2 + stop - first + (0 if ends else 1)
-    t, F = np.empty(n), np.empty(n)
+    if n > points.shape[1]:
+        points = np.empty((2, n))
+    t, F = points[0, :n], points[1, :n]
     t[0] = t[1] = start
     F[0], F[1] = force, value_at(time, value, first, start)
     for i in range(first, stop):
         t[2 + i - first], F[2 + i - first] = time[i], value[i]
     if not ends:
         t[n - 1], F[n - 1] = until, value_at(time, value, stop, until)
+    S[TIME], S[FORCE] = until, F[n - 1]
     return t, F
 
 
@@ -173,31 +196,25 @@ def _build(stamp: int) -> Callable[..., Any]:
     def run(
         wave_time: FloatArray,
         wave: FloatArray,
-        start: float,
-        force_before: float,
         until: float,
         k_F: float,
         par: FloatArray,
         S: FloatArray,
         tolerance: float,
-        node_a: bool,
-        integrate: bool,
-        keep_spikes: bool,
-        keep_1: bool,
-        keep_2: bool,
+        asked: int,
         most: float,
     ) -> Any:
         _ = stamp
         status = DONE
-        time, force = points_between(wave_time, wave, start, force_before, until)
-        S[FORCE] = force[-1]
+        node_a, integrate = asked & NODE_A != 0, asked & INTEGRATOR != 0
+        keep_spikes, keep_1 = asked & SPIKES != 0, asked & DENSE != 0
+        keep_2 = asked & DENSE_V_C2 != 0
+        par, S = borrowed(par), borrowed(S)
+        time, force = points_between(wave_time, wave, until, wave_room(), S)
         if not abs(k_F) * largest_of(force) <= LARGEST_VOLTAGE:
             status = STRONG
-        seg_rows = np.empty((8 if node_a else max(time.size, 1), SEGMENT_ROW))
-        step_rows = np.empty((16, STEP_ROW))
-        piece_rows = np.empty((16, PIECE_ROW))
-        spikes = np.empty(64)
-        par, S = borrowed(par), borrowed(S)
+        seg_rows, step_rows, piece_rows = segments_room(), steps_room(), pieces_room()
+        spikes = spikes_room()
         nodes, matrix = nodes_room(), matrix_room()
         values, a, part = series_room(), series_room(), points_room()
         Q = part[ORDER + 1 :]
@@ -435,7 +452,8 @@ def _build(stamp: int) -> Callable[..., Any]:
             S[Y] = y
             if status != DONE:
                 break
-        return status, spikes, stored(seg_rows, step_rows, piece_rows, S)
+        count = int(S[COUNT]) if keep_spikes and status == DONE else 0
+        return status, stored(spikes, count, seg_rows, step_rows, piece_rows, S)
 
     return run
 

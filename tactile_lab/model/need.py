@@ -26,6 +26,10 @@ DEPENDS = {
 EVENTS = frozenset({"spikes", "V_K", "rate", "statistics"})
 """Signals that are known from the spikes alone, in as much memory as those take."""
 
+NODE_A, INTEGRATOR, SPIKES, DENSE, DENSE_V_C2 = 1, 2, 4, 8, 16
+"""What compiled code is asked for, one bit each: V_C1 and V_C2 to be solved, spikes to
+be kept, steps of V_P and V_C1 to be stored, and of V_C2."""
+
 STAGES = ("V_P", "V_C1", "I_C", "V_C2", "spikes", "V_K")
 """Stages of the cascade with a counter each."""
 
@@ -85,6 +89,17 @@ class Need:
         """Whether V_C2 and its spikes must be solved."""
         asked = bool(self.signals & {"V_C2", "spikes", "statistics"})
         return asked or (self.coupled and self.node_a)
+
+    @cached_property
+    def asked(self) -> int:
+        """All this for compiled code: a sum of the bits above."""
+        return (
+            (NODE_A if self.node_a else 0)
+            + (INTEGRATOR if self.integrator else 0)
+            + (SPIKES if "spikes" in self.signals else 0)
+            + (DENSE if self.dense else 0)
+            + (DENSE_V_C2 if self.dense_V_C2 else 0)
+        )
 
     @cached_property
     def stale(self) -> tuple[str, ...]:

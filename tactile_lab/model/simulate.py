@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import time as wall
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from types import ModuleType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -117,7 +118,7 @@ def simulate(
         SolverError: the model cannot answer to that tolerance.
     """
     duration = force.end if until is None else until
-    if not (math.isfinite(duration) and duration > 0):
+    if not 0 < duration < math.inf:
         raise ParameterError(
             f"The duration is {duration} s; it must be finite and above 0 s. Give "
             "`until` or a force with a last point after 0 s."
@@ -130,22 +131,22 @@ def simulate(
     need = Need.of(keep, circuit.saturation)
     tolerance = checked_tolerance(tolerance)
     began = wall.perf_counter()
-    first = state_at_start(circuit, float(force.value[0]), start)
-    solution = _solve()(circuit, first, force, duration, need, tolerance)
-    return Result(
-        duration=duration,
-        spike_times=solution.spike_times if "spikes" in need.signals else None,
-        run_time=wall.perf_counter() - began,
-        solution=solution,
-    )
+    solver = _solver()
+    if start is None:
+        begin = solver.start_at_rest(circuit, force.first)
+    else:
+        begin = solver.start_from(circuit, state_at_start(circuit, force.first, start))
+    solution = solver.solve(begin, force, duration, need, tolerance)
+    spikes = solution.spike_times if "spikes" in need.signals else None
+    return Result(duration, spikes, wall.perf_counter() - began, solution)
 
 
 @cache
-def _solve() -> Callable[..., Solution]:
-    """`solve`: compiled code, loaded by those who simulate, and looked for once."""
-    from tactile_lab.model.solver import solve
+def _solver() -> ModuleType:
+    """Compiled code, loaded by those who simulate, and looked for once."""
+    from tactile_lab.model import solver
 
-    return solve
+    return solver
 
 
 def state_at_start(circuit: Circuit, force: float, start: Start | None) -> State:

@@ -108,18 +108,19 @@ class Solution:
     @property
     def evaluations(self) -> int:
         """Evaluations of Eq. (16), of Eq. (17) or of both at once."""
-        of_16 = ORDER * int(self.memory[kernel.ITERATIONS])
-        return of_16 + (ORDER + 1) * int(self.memory[kernel.EXPANSIONS])
+        counts = self.memory.item
+        of_16 = ORDER * counts(kernel.ITERATIONS)
+        return int(of_16 + (ORDER + 1) * counts(kernel.EXPANSIONS))
 
     @property
     def error_spike_time(self) -> float:
         """Largest estimated error of a spike time, s."""
-        return float(self.memory[spiking.LARGEST_ERROR])
+        return self.memory.item(spiking.LARGEST_ERROR)
 
     @property
     def error_V_C1(self) -> float:
         """Largest estimated error of V_C1, V."""
-        return float(self.memory[kernel.Y_LARGEST_ERROR])
+        return self.memory.item(kernel.Y_LARGEST_ERROR)
 
     @property
     def statistics(self) -> Statistics | None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import NamedTuple
+
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError, SolverError, TactileLabError
 from tactile_lab.model import kernel, spiking
 from tactile_lab.model.circuit import LARGEST_VOLTAGE, Circuit
+from tactile_lab.model.equations import rest
 from tactile_lab.model.need import Need
 from tactile_lab.model.packed import parameters
 from tactile_lab.model.solution import Solution
@@ -20,51 +24,64 @@ MOST_COUPLED = 1e5
 """The same where T1 saturates and a spike takes a hundred times as long."""
 
 
+class Start(NamedTuple):
+    """Where a slice starts, for us and for the kernel."""
+
+    circuit: Circuit
+    state: State
+    parameters: FloatArray
+    memory: FloatArray
+
+
+def start_from(circuit: Circuit, state: State) -> Start:
+    """A slice's start in `state`."""
+    return Start(circuit, state, parameters(circuit), _memory(state))
+
+
+@lru_cache(maxsize=256)
+def start_at_rest(circuit: Circuit, force: float) -> Start:
+    """A slice's start at 0 s, at rest under `force` N."""
+    return start_from(circuit, rest(circuit, force=force))
+
+
 def solve(
-    circuit: Circuit,
-    state: State,
-    force: Waveform,
-    until: float,
-    need: Need,
-    tolerance: float,
+    start: Start, force: Waveform, until: float, need: Need, tolerance: float
 ) -> Solution:
-    """From `state` to `until`; what `need` asks for is kept."""
+    """From `start` to `until`; what `need` asks for is kept."""
+    circuit, state, par, memory = start
     stale = state.left_out
-    if (need.node_a and "V_C1" in stale) or (need.integrator and "V_C2" in stale):
+    if stale and (
+        (need.node_a and "V_C1" in stale) or (need.integrator and "V_C2" in stale)
+    ):
         raise ParameterError(
             "The state was advanced without what is asked for now; keep the same "
             "signals in every slice."
         )
-    par = parameters(circuit)
-    S = _memory(state)
-    # whole numbers would have the kernel compiled anew for them
-    span = float(state.time), float(state.force), float(until)
-    keep_spikes = "spikes" in need.signals
+    S = memory.copy()
+    end = float(until)  # a whole number would have the kernel compiled anew for it
     if circuit.saturation and need.node_a:
         from tactile_lab.model import coupled
 
-        most = MOST_COUPLED
-        status, spikes, rows = coupled.run(
-            force.time, force.value, *span, circuit.k_F, par, S,
-            tolerance, keep_spikes, need.dense, need.dense_V_C2, most,
-        )  # fmt: skip
+        run, most = coupled.run, MOST_COUPLED
     else:
-        most = MOST_SPIKES
-        status, spikes, rows = kernel.run(
-            force.time, force.value, *span, circuit.k_F, par, S,
-            tolerance, need.node_a, need.integrator, keep_spikes, need.dense,
-            need.dense_V_C2, most,
-        )  # fmt: skip
+        run, most = kernel.run, MOST_SPIKES
+    status, found = run(
+        force.time, force.value, end, circuit.k_F, par, S, tolerance, need.asked, most
+    )
     if status != kernel.DONE:
         length = until - state.time
         raise _refusal(status, circuit, force, length, float(S[spiking.COUNT]), most)
-    count = int(S[spiking.COUNT]) if keep_spikes else 0
-    return Solution(circuit, need, force, state, until, spikes[:count], par, rows, S)
+    spikes = rows = found
+    if need.dense:
+        count = int(S[spiking.COUNT]) if "spikes" in need.signals else 0
+        spikes, rows = found[:count], found[count:]
+    return Solution(circuit, need, force, state, until, spikes, par, rows, S)
 
 
 def _memory(state: State) -> FloatArray:
     """What the kernel knows at the start; see `spiking` and `kernel`."""
     S = kernel.FRESH.copy()
+    S[kernel.TIME], S[kernel.FORCE] = state.time, state.force
     S[spiking.VOLTAGE] = state.V_C2
     S[kernel.Y] = state.V_C1
     S[kernel.V_P] = S[kernel.V_P_HIGHEST] = state.V_P

@@ -13,6 +13,7 @@ from tactile_lab.model import coupled, kernel, spiking
 from tactile_lab.model.batch import appended, begun, numbers_of, train
 from tactile_lab.model.compiled import entry, inner, inner_making_arrays, source_stamp
 from tactile_lab.model.integrator import TAU_L, V_FIRE, Y_CRITICAL, Q_at
+from tactile_lab.model.need import SPIKES
 from tactile_lab.model.node_a import LAMBDA, TAU, B_at, V_P_at, equilibrium
 from tactile_lab.model.rest_pair import rest_of_both
 from tactile_lab.model.transistor import (
@@ -79,12 +80,8 @@ def train_of_both(
     y, v = rest_of_both(par)
     if v >= c.fire_voltage:
         v = c.reset_voltage
-    begun(0.0, y, v, S)
-    status, spikes, _rows = coupled.run(
-        time, force, 0.0, force[0], until, k_F, par, S, tolerance, True, False, False,
-        most,
-    )  # fmt: skip
-    return status, spikes
+    begun(0.0, y, v, force[0], S)
+    return coupled.run(time, force, until, k_F, par, S, tolerance, SPIKES, most)
 
 
 def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
