@@ -39,6 +39,7 @@ from tactile_lab.waveform import Waveform
 DOCS = Path(__file__).parent
 REPEATS = 1000
 FINE = 2e-4
+BINS = 400
 FORCE = Waveform.pulse(0.12, ramp=0.25, hold=4.0, rest=2.0).then(
     Waveform.pulse(0.18, ramp=0.25, hold=6.0, rest=4.0)
 )
@@ -58,10 +59,10 @@ def law(seed: int, shape: float, truth: Truth, hold: float) -> dict[str, Estimat
     return {"alpha": fit.alpha, "beta": fit.beta, "gamma": fit.gamma}
 
 
-def circuit_run(truth: Truth, bins: int = 400) -> tuple[NDArray, NDArray]:
+def circuit_run(truth: Truth) -> tuple[NDArray, NDArray]:
     """Bin centres and V_C1 there of a circuit with these parameters."""
     made = simulate(replace(Circuit(), **truth), FORCE, keep=("V_C1",))
-    middle = (np.arange(bins) + 0.5) * FORCE.end / bins
+    middle = (np.arange(BINS) + 0.5) * FORCE.end / BINS
     return middle, made.sample("V_C1", middle)
 
 

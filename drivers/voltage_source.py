@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drivers.serial_line.instrument import SerialInstrument
-from drivers.serial_line.link import SerialLink, Spy
+from drivers.serial_line.link import SerialLink
 from drivers.serial_line.source_wire import RECONNECT, VERIFICATIONS, SourceWire
 from tactile_lab.clock import Clock
 from tactile_lab.errors import (
@@ -50,7 +50,6 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
         limits: what may be asked of it.
         clock: the bench's time.
         baud: instead of the row's.
-        spy: told of every byte, or None.
 
     Raises:
         SceneError: the limits are beyond the model.
@@ -65,7 +64,6 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
         clock: Clock,
         *,
         baud: int | None = None,
-        spy: Spy | None = None,
     ) -> None:
         self.name, self.dialect, self.limits = name, dialect, limits
         self.capability = dialect.capability(limits)
@@ -76,7 +74,6 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
             clock,
             what=f"source of {name}",
             identify=dialect.identify,
-            spy=spy,
         )
         self._clock = clock
         super().__init__(SourceWire(link, dialect))

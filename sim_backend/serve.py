@@ -35,8 +35,8 @@ BACKLOG = 1000
 class CoilOnly(DrivenCoil):
     """Coil and field without sensor or scope; safe for all threads."""
 
-    def __init__(self, magnet: Magnet, options: PlantOptions | None = None) -> None:
-        super().__init__((options or PlantOptions()).electromagnet())
+    def __init__(self, magnet: Magnet) -> None:
+        super().__init__(PlantOptions().electromagnet())
         self._magnet = magnet
 
     def field(self, time: float) -> float:
@@ -83,8 +83,6 @@ class ServedBench:
         paced: let bytes take the time the baud rate gives them, and the instruments
             the time they take to act.
         log: JSON line per thing the source was told, with the time since boot.
-        magnet: field per current; the built-in bench's unless given.
-        seed: of the noise of the readings.
 
     Attributes:
         gate: what the source meter is connected to.
@@ -108,13 +106,11 @@ class ServedBench:
         baud: int | None = None,
         paced: bool = False,
         log: Path | None = None,
-        magnet: Magnet | None = None,
-        seed: int = 1,
     ) -> None:
         clock: Clock = RealClock()
         self._log: TextIO | None = None
         self._servers: dict[str, SerialServer] = {}
-        plant = CoilOnly(magnet or Magnet(r=6e-3))
+        plant = CoilOnly(Magnet(r=6e-3))
         self.gate = Gate()
         try:
             if coil is not None:
@@ -126,17 +122,17 @@ class ServedBench:
                 self._add("coil", coil, source, wire.at(baud), clock, paced)
             if teslameter is not None:
                 known = teslameter_dialect(meter_row)
-                meter = meter_far_end(plant, known, clock, noise=2e-6, seed=seed)
+                meter = meter_far_end(plant, known, clock, noise=2e-6, seed=1)
                 self._add("teslameter", teslameter, meter, known.serial, clock, paced)
             if voltage_source is not None:
                 speaks = voltage_dialect(voltage_row)
-                held = voltage_far_end(self.gate, "V_GS", speaks, clock, seed=seed)
+                held = voltage_far_end(self.gate, "V_GS", speaks, clock, seed=1)
                 self._add(
                     "voltage_source", voltage_source, held, speaks.serial, clock, paced
                 )
             if thermometer is not None:
                 warm = thermometer_dialect(thermometer_row).at(None)
-                sensor = thermometer_far_end(Air(), warm, clock, seed=seed)
+                sensor = thermometer_far_end(Air(), warm, clock, seed=1)
                 self._add("thermometer", thermometer, sensor, warm.serial, clock, paced)
         except BaseException:
             self.close()

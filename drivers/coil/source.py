@@ -353,12 +353,8 @@ class CoilSource(SerialInstrument[CoilWire]):
         """Unlatch the interlock after its cause was looked at; heat used remains."""
         self._interlock.acknowledge()
 
-    def safe_off(self, *, ramp: bool = True) -> OffReport:
-        """Ramp to 0 A, output off, read back; idempotent, never raises.
-
-        Args:
-            ramp: False goes to 0 A at once, for the second Ctrl-C.
-        """
+    def safe_off(self) -> OffReport:
+        """Ramp to 0 A, output off, read back; idempotent, never raises."""
         if not self._reached:
             return OffReport(
                 False,
@@ -374,7 +370,7 @@ class CoilSource(SerialInstrument[CoilWire]):
             rested=self._clock.now() - self._commanded,
             slew=self._limits.slew,
             exchange=self._interval / MARGIN,
-            ramp=ramp and not (self._analogue and self._setpoint is None),
+            ramp=not (self._analogue and self._setpoint is None),
         )
         self._commanded = self._clock.now()
         if report.verified:

@@ -23,6 +23,8 @@ from tactile_lab.instruments.channels import check_channels, described
 from tactile_lab.instruments.scope_dialect import ScopeDialect
 from tactile_lab.scope import Block, Channel, ScopeCapability, Stream
 
+POLL = 0.02
+"""Time between two polls, s."""
 _MOST_ERRORS = 20
 _SETTLING, _PATIENCE = 0.2, 3.0
 
@@ -38,7 +40,6 @@ class UsbtmcScope(Opened):
         clock: host time.
         serial: serial number, where several are attached.
         backend: pyusb backend; None for libusb.
-        poll_interval: how often the owner will poll, s.
         timeout: longest wait for one transfer, s.
     """
 
@@ -49,12 +50,10 @@ class UsbtmcScope(Opened):
         clock: Clock,
         serial: str | None = None,
         backend: Any = None,
-        poll_interval: float = 0.02,
         timeout: float = 2.0,
     ) -> None:
         self._dialect = dialect
         self._clock = clock
-        self._poll_interval = poll_interval
         self._link = UsbtmcLink(
             vendor=dialect.vendor, product=dialect.product, serial=serial,
             timeout=timeout, header_once=dialect.header_once, backend=backend,
@@ -80,7 +79,7 @@ class UsbtmcScope(Opened):
     @property
     def poll_interval(self) -> float:
         """How often to poll while it runs, s."""
-        return self._poll_interval
+        return POLL
 
     def open(self) -> None:
         """Claim the interface and identify the scope; idempotent.
@@ -145,7 +144,7 @@ class UsbtmcScope(Opened):
             full_scale=row.divisions_high * row.codes_per_division << SHIFT,
             shift=SHIFT,
             started=(before + after) / 2,
-            uncertainty=(after - before) / 2 + self._poll_interval,
+            uncertainty=(after - before) / 2 + POLL,
             record=row.depth[len(channels)],
         )
         self._running, self._next = True, 0

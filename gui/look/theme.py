@@ -21,8 +21,8 @@ class Theme(QObject):
 
     changed = Signal()
 
-    def __init__(self, choice: str = "system", parent: QObject | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, choice: str = "system") -> None:
+        super().__init__()
         self.choice = choice
         self.tokens = self._wanted()
         hints = QGuiApplication.styleHints()

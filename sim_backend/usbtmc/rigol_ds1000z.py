@@ -81,23 +81,20 @@ class SimulatedDs1000z:
     Args:
         source: what lies at its inputs "1" to "4".
         clock: the time it lives in.
-        serial: serial number.
-        variant: model.
         sluggish: how many status questions after arming still tell of the last record.
         clock_error: relative error of its sample clock; 50e-6 is 50 ppm.
     """
+
+    identity = "RIGOL TECHNOLOGIES,DS1104Z,DS1ZSIM0001,00.04.04"
 
     def __init__(
         self,
         source: SampleSource,
         clock: Clock,
         *,
-        serial: str = "DS1ZSIM0001",
-        variant: str = "DS1104Z",
         sluggish: int = 0,
         clock_error: float = 0.0,
     ) -> None:
-        self.identity = f"RIGOL TECHNOLOGIES,{variant},{serial},00.04.04"
         self.channels = {str(n): _Channel() for n in range(1, 5)}
         self.channels["1"].shown = True
         self._source, self._clock = source, clock

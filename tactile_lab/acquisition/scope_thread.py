@@ -24,13 +24,12 @@ class ScopeThread(InstrumentThread):
     so the run stops with an error and keeps what it has; the simulated clock waits.
     """
 
-    def __init__(self, scope: Scope, clock: Clock, queue: int = QUEUE) -> None:
+    def __init__(self, scope: Scope, clock: Clock) -> None:
         super().__init__("scope", clock)
         self.scope = scope
         self.stream: Stream | None = None
         self.polled_until = float("-inf")
         self._queue: deque[Block] = deque()
-        self._capacity = queue
         self._wanted: tuple[tuple[Channel, ...], float] | None = None
         self._halt = False
         self._due: float | None = None
@@ -60,7 +59,7 @@ class ScopeThread(InstrumentThread):
     def take(self) -> Block | None:
         """The oldest block not taken yet."""
         block = self._queue.popleft() if self._queue else None
-        if block is not None and len(self._queue) == self._capacity - 1:
+        if block is not None and len(self._queue) == QUEUE - 1:
             self.clock.notify()
         return block
 
@@ -154,14 +153,12 @@ class ScopeThread(InstrumentThread):
         self.clock.notify()
 
     def _hand_over(self, block: Block) -> None:
-        if len(self._queue) >= self._capacity:
+        if len(self._queue) >= QUEUE:
             if not self.clock.simulated:
                 raise RecordingError(
-                    f"{self._capacity} blocks of samples wait to be processed: this "
+                    f"{QUEUE} blocks of samples wait to be processed: this "
                     "computer does not keep up with the sample rate. Lower "
                     "record.sample_rate or record fewer channels."
                 )
-            self.clock.wait_for(
-                lambda: self._leaving or len(self._queue) < self._capacity
-            )
+            self.clock.wait_for(lambda: self._leaving or len(self._queue) < QUEUE)
         self._queue.append(block)

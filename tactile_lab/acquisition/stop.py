@@ -41,24 +41,21 @@ class Lease:
 
     Args:
         clock: of the coil.
-        length: how long one sign of life lasts, s.
         holder: who shows it, and where to look if he does not, for a person.
     """
 
     def __init__(
         self,
         clock: Clock,
-        length: float = LEASE,
         holder: tuple[str, str] = ("The deciding loop", "a stuck disk or scope"),
     ) -> None:
         self._clock = clock
-        self._length = length
         self._holder = holder
         self._until: float | None = None
 
     def renew(self) -> None:
         """Show life; the first renewal starts the lease."""
-        self._until = self._clock.now() + self._length
+        self._until = self._clock.now() + LEASE
 
     def end(self) -> None:
         """Stop watching: the loop ended in good order."""
@@ -74,5 +71,5 @@ class Lease:
             who, where = self._holder
             raise InterlockError(
                 f"{who} gave no sign of life for longer than its lease of "
-                f"{self._length:g} s; the coil was switched off. Look for {where}."
+                f"{LEASE:g} s; the coil was switched off. Look for {where}."
             )

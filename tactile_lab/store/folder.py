@@ -58,7 +58,6 @@ class RunFolder:
         info: Mapping[str, Any],
         *,
         needed: int = 0,
-        reserve: int = RESERVE,
     ) -> RunFolder:
         """Make a new folder under `root`, its `run.json` with status running first.
 
@@ -67,7 +66,6 @@ class RunFolder:
             name: of protocol or scene; becomes part of the folder's name.
             info: further entries of `run.json`, plain JSON types.
             needed: bytes the run is expected to take.
-            reserve: bytes that must stay free beside them.
 
         Raises:
             RecordingError: the disk lacks room, or the folder cannot be written.
@@ -76,7 +74,7 @@ class RunFolder:
         lost = f"No run folder can be made under {root}"
         with _refused(lost, "Choose a writable folder with --out."):
             root.mkdir(parents=True, exist_ok=True)
-            check_space(root, needed + reserve)
+            check_space(root, needed + RESERVE)
             path = _unique(root, f"{began:%Y-%m-%d_%H%M%S}_{_plain(name)}")
             content = {
                 "schema": SCHEMA,

@@ -193,12 +193,13 @@ right_hand_side = _build(source_stamp())
 """`slopes` for whoever calls from Python."""
 
 
+MOST_SPIKES = 2_000_000
 Piece = Callable[[float, float, FloatArray, bool, Any], tuple[float, FloatArray, bool]]
 """Integrate from s to s_end (local) with a right-hand side: where it stopped, the
 state there, and whether V_C2 reached V_fire."""
 
 
-def march(problem: Problem, piece: Piece, cap: float, most: int = 2_000_000) -> Answer:
+def march(problem: Problem, piece: Piece, cap: float) -> Answer:
     """The answer of a general solver called from Python, restarted at every event.
 
     Raises:
@@ -239,8 +240,8 @@ def march(problem: Problem, piece: Piece, cap: float, most: int = 2_000_000) -> 
                 resume, y[1] = -1.0, c.reset_voltage
             if fired:
                 spikes.append(t0 + s)
-                if len(spikes) > most:
-                    raise OutOfTimeError(f"stopped after {most} spikes")
+                if len(spikes) > MOST_SPIKES:
+                    raise OutOfTimeError(f"stopped after {MOST_SPIKES} spikes")
                 y[1] = c.reset_voltage
                 if c.reset_time > 0:
                     resume = t0 + s + c.reset_time
