@@ -187,8 +187,6 @@ def _build_adaptive(stamp: int) -> Callable[..., Any]:
         spikes = np.empty(64)
         par, k, dense = borrowed(par), stages_room(), dense_room()
         error, both, J = pair_room(), flow_room(), jacobian_room()
-        for i in range(8):
-            k[i, 0] = k[i, 1] = 0.0
         resume = -1.0
         h = 1e-4
         for n in range(segments.shape[0]):
@@ -267,8 +265,6 @@ def _build_fixed(stamp: int) -> Callable[..., Any]:
         count = evaluations = 0
         spikes = np.empty(64)
         par, k, both = borrowed(par), stages_room(), flow_room()
-        for i in range(8):
-            k[i, 0] = k[i, 1] = 0.0
         resume = -1.0
         for n in range(segments.shape[0]):
             t0, V0, p = segments[n, 0], segments[n, 2], segments[n, 3]
@@ -282,9 +278,10 @@ def _build_fixed(stamp: int) -> Callable[..., Any]:
                 h = end - s
                 for i in range(order):
                     c = 0.0 if i == 0 else (1.0 if i == 3 else 0.5)
-                    z, w = y + c * h * k[i - 1, 0], v + c * h * k[i - 1, 1]
-                    if i == 0:
-                        z, w = y, v
+                    z, w = y, v
+                    if i > 0:
+                        z += c * h * k[i - 1, 0]
+                        w += c * h * k[i - 1, 1]
                     slopes(s + c * h, z, w, V0, p, held, par, both, k[i])
                     evaluations += 1
                 if order == RK4:
