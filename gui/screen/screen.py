@@ -257,10 +257,7 @@ class Screen(QObject):
 
     def run_ended(self, done: Executed) -> None:
         """The run is on disk now."""
-        self.ending = (
-            f"{done.state.capitalize()} · {done.folder.name} · "
-            f"{looked_for(done.spikes, 'spike')}"
-        )
+        self.ending = _ended(done.state, done.folder, done.spikes)
         source = self._panels.session.source
         if source is not None:
             self._panels.centre.view.set_now(source.reach, source.length)
@@ -343,11 +340,10 @@ class Screen(QObject):
         panels.session.opened = (source.path.name,)
         panels.centre.view.clear_cursors()
         panels.centre.show_source(source, self._lanes())
-        status = str(source.info.get("status")).capitalize()
-        searched = "spikes" in source.signals
-        spikes = looked_for(source.spikes.size if searched else None, "spike")
+        spikes = source.spikes.size if "spikes" in source.signals else None
         self.results.stored(source)
-        self._show_stored(source, f"{status} · {source.path.name} · {spikes}")
+        status = str(source.info.get("status"))
+        self._show_stored(source, _ended(status, source.path, spikes))
         self.changed.emit()
 
     def _exchange(self, source: RunSource) -> None:
@@ -414,6 +410,11 @@ class Screen(QObject):
                 for e in newest
             ]
         )
+
+
+def _ended(status: str, folder: Path, spikes: int | None) -> str:
+    """How a run ended: "Complete · 2026-11-23_demo · 5 spikes"."""
+    return f"{status.capitalize()} · {folder.name} · {looked_for(spikes, 'spike')}"
 
 
 def _runs_in(out: Path) -> list[RunSummary]:

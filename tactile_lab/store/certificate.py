@@ -38,7 +38,8 @@ class Certificate:
         online: spikes found while the run went on.
         offline: spikes found again in the stored samples; None where the channel was
             not stored.
-        differing: spikes that only one of the two searches found; None likewise.
+        spikes: that only one of the two searches found, lost or invented; None
+            likewise.
         seen_from: shortest stretch of missing samples that the scope's driver would
             have noticed by its clock, s; None where it said nothing of that.
         missing: samples are missing, as the run found out, and how many is not known.
@@ -50,7 +51,7 @@ class Certificate:
     gaps: int
     online: int
     offline: int | None
-    differing: int | None
+    spikes: int | None
     covered: float | None = None
     streamed: float | None = None
     seen_from: float | None = None
@@ -61,11 +62,6 @@ class Certificate:
     def samples(self) -> int | None:
         """Samples lost; None if not known."""
         return None if self.produced is None else self.produced - self.written
-
-    @property
-    def spikes(self) -> int | None:
-        """Spikes lost or invented; None where this cannot be checked."""
-        return self.differing
 
     @property
     def clean(self) -> bool:
@@ -93,7 +89,7 @@ class Certificate:
             )
         if not self.searched:
             spikes = "spikes were not looked for"
-        elif self.differing is None:
+        elif self.spikes is None:
             spikes = (
                 f"{count(self.online, 'spike')}, not possible to check (not stored)"
             )
@@ -146,7 +142,7 @@ def certify(run: Run) -> Certificate:
         seen_from=_seen_from(run.info),
         online=online.size,
         offline=None if offline is None else offline.size,
-        differing=None if offline is None else unmatched(online, offline).size,
+        spikes=None if offline is None else unmatched(online, offline).size,
         missing=bool(run.info.get("samples_missing")),
         searched=run.detection is not None,
     )

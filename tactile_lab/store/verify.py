@@ -118,7 +118,7 @@ def verify(path: Path, progress: Progress = nothing) -> Verification:
                 progress(1.0)
                 findings += _certificate(run, certificate)
                 # the spikes of a cut-short run lag behind its samples
-                if certificate.differing and info["status"] != "running":
+                if certificate.spikes and info["status"] != "running":
                     findings += _spikes(run)
         except (OSError, KeyError, RuntimeError, ValueError) as error:
             findings.append(Damage(DATA, f"its structure is damaged ({_brief(error)})"))

@@ -250,7 +250,7 @@ def test_a_spike_that_is_not_in_the_samples_is_named(complete):
     with h5py.File(complete / "data.h5", "r+") as file:
         file["spikes"][2, "sample"] = 1234.5
     verdict = verify(complete)
-    assert verdict.certificate.differing == 2
+    assert verdict.certificate.spikes == 2
     assert "sample 1234.500" in str(verdict.findings[0])
 
 
