@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from gui.lanes.expected import Aligned, Preview, Stretch, settled
@@ -54,6 +56,24 @@ class LiveSource(Source):
         self._slow = {name: Readings() for name in ("force", *AVERAGED)}
         self._spikes = np.empty(1024)
         self._spike_count = 0
+        self._of: LiveSource | None = None
+
+    def frozen(self) -> LiveSource:
+        """The same up to now: what comes later is not in it."""
+        made = copy(self)
+        made.stay(self)
+        return made
+
+    def stay(self, of: LiveSource) -> None:
+        """Be a view of a run in progress as it is now."""
+        self._of, self.holds = of, list(self.holds)
+        reach = self.reach
+        self._slow = {name: one.until(reach) for name, one in self._slow.items()}
+
+    @property
+    def of(self) -> Source:
+        """The run in progress, of which this may be a frozen view."""
+        return self._of or self
 
     @property
     def has_model(self) -> bool:
@@ -159,7 +179,12 @@ class LiveSource(Source):
         """The measured signal; the force holds from each set-point to the next."""
         pyramid = self._pyramids.get(signal)
         if pyramid is not None:
-            return pyramid.between(start, end, count)
+            if self._of is None:
+                return pyramid.between(start, end, count)
+            until = self._streamed  # its pyramids go on growing
+            found = pyramid.between(start, max(start, min(end, until)), count)
+            cells = np.searchsorted(found.time + found.width, until, side="right")
+            return found[: int(cells)]
         if signal not in self._slow:
             return Trace.nothing()
         hold = self.reach if signal == "force" else None
@@ -207,6 +232,13 @@ class Readings:
     def last(self) -> float | None:
         """The last reading."""
         return float(self._rows[1, self._count - 1]) if self._count else None
+
+    def until(self, time: float) -> Readings:
+        """Those up to a time, s, which no later ones are added to."""
+        made = Readings()
+        count = np.searchsorted(self._rows[0, : self._count], time, side="right")
+        made._rows, made._count = self._rows.copy(), int(count)
+        return made
 
     def add(self, time: float, value: float) -> None:
         """Append a reading."""

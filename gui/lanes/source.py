@@ -38,6 +38,11 @@ class Source:
     path: Path | None = None
 
     @property
+    def of(self) -> Source:
+        """What this is a view of: itself."""
+        return self
+
+    @property
     def has_model(self) -> bool:
         """Whether a model is beside the data."""
         return False

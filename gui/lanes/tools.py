@@ -113,6 +113,8 @@ class Tools(QWidget):
     def show_possible(self, *, growing: bool) -> None:
         """Offer what means something for what the lanes show; `growing`: it goes on."""
         model = self._stack.source.has_model
+        if not growing and self.freeze.isChecked():
+            self.freeze.setChecked(False)  # it could not be taken back
         for button, possible in (
             (self.follow, growing),
             (self.freeze, growing),

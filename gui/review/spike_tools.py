@@ -73,7 +73,7 @@ class SpikeTools(QObject):
     def _folder(self) -> Path | None:
         """Where samples can be read: of a run on disk, or of that in progress."""
         source, run = self._source, self._session.run
-        return run.folder if source is run.source else source.members[0].source.path
+        return run.folder if source.of is run.source else source.members[0].source.path
 
     @property
     def _span(self) -> tuple[float, float]:

@@ -48,8 +48,11 @@ class FrameLoop(QObject):
     def freeze(self, on: bool) -> None:
         """Let the lanes stand still; acquisition goes on, and they catch up later."""
         self.frozen = on
-        if not on and self._screen.live is not None:
-            self._show_newest(self._screen.live)
+        live = self._screen.live
+        if live is not None:
+            shown = live.frozen() if on else live
+            self._panels.centre.stack.exchange_source(shown)
+            self._show_newest(shown)
 
     def stop(self) -> None:
         """End the loop."""
@@ -111,7 +114,7 @@ class FrameLoop(QObject):
             bar.hide()
         panels.centre.tools.show_monitor(on=monitor.alive)
         # also once it has ended: results of a run would lie beside lanes of none
-        seen = panels.centre.stack.source is monitor.source
+        seen = panels.centre.stack.source.of is monitor.source
         panels.review.show_monitor(on=monitor.alive or seen)
 
     def _keep_budget(self, cost: float) -> None:
