@@ -27,7 +27,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from provenance import provenance
+from provenance import provenance, tell
 
 HOUR = 3600.0
 SLACK = 10.0
@@ -195,9 +195,7 @@ def main() -> int:
             "",
         ]
     )
-    print(text)
-    if chosen.out is not None:
-        chosen.out.write_text(text, encoding="utf-8")
+    tell(text, chosen.out)
     return 0 if flat else 1
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from provenance import provenance
+from provenance import provenance, tell
 
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.model.circuit import SATURATION_HEADROOM, Circuit
@@ -163,9 +163,7 @@ another by the full solver under the force itself; both with Wilson's 95 % inter
 {met} of {len(rows)} are met; the wants that cannot be had together are named. The two
 yields' intervals overlap in {agree} of {len(rows)}.
 """
-    print(text)
-    if out:
-        out.write_text(text, encoding="utf-8")
+    tell(text, out)
 
 
 def _percent(share: Estimate) -> str:

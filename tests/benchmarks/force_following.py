@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from provenance import provenance
+from provenance import provenance, tell
 
 from protocols.touch import Touch
 from protocols.vibration import Vibration
@@ -58,9 +58,7 @@ def main() -> None:
         lines.append(f"| {what} | {row} |")
         print(lines[-1], flush=True)
     text = "\n".join(lines) + "\n"
-    print(text)
-    if chosen.out is not None:
-        chosen.out.write_text(text, encoding="utf-8")
+    tell(text, chosen.out)
 
 
 def wired() -> Path:

@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from fuzz_inputs import KINDS, Case, make, prepare  # beside it
-from provenance import provenance
+from provenance import provenance, tell
 
 LONGEST, STUCK = 30.0, 600.0
 """Longest time of the processor, and by the clock, that a case may take, s."""
@@ -192,9 +192,7 @@ def main() -> int:
     total = sum(found.values(), Counter[str]())
     lines.append(_line("**all**", total))
     text = "\n".join([*_head(chosen.seed), *lines]) + "\n"
-    print(text)
-    if chosen.out is not None:
-        chosen.out.write_text(text, encoding="utf-8")
+    tell(text, chosen.out)
     return 1 if any(total[one] for one in WRONG) else 0
 
 

@@ -25,7 +25,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from provenance import provenance
+from provenance import provenance, tell
 
 LONGEST = 20
 """Processor time of a call from which on it is hopeless, s."""
@@ -193,9 +193,7 @@ def main() -> int:
             *rows,
         ]
     )
-    print(text)
-    if chosen.out is not None:
-        chosen.out.write_text(text + "\n", encoding="utf-8")
+    tell(text + "\n", chosen.out)
     return 1 if any(total[end] for end in (HOPELESS, MISTAKE, DIED)) else 0
 
 

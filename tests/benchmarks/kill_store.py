@@ -21,7 +21,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from numpy.typing import NDArray
-from provenance import provenance
+from provenance import provenance, tell
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.scope import Block, Channel, Stream
@@ -170,9 +170,7 @@ def main() -> None:
             "",
         ]
     )
-    if options.out:
-        options.out.write_text(text, encoding="utf-8")
-    print(text)
+    tell(text, options.out)
     wrong = sum(c for end, c in ends.items() if end.isupper() or "UNSOUND" in end)
     raise SystemExit(1 if wrong or max(losses) > 1 else 0)
 

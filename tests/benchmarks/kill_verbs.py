@@ -36,7 +36,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from provenance import provenance
+from provenance import provenance, tell
 
 from tactile_lab.cli import main as command_line
 from tactile_lab.errors import RunFolderError
@@ -361,9 +361,7 @@ def main() -> int:
                 if told[:2].isupper():
                     print(json.dumps(entry), flush=True)
     text = table(entries, chosen.seed)
-    print(text)
-    if chosen.out is not None:
-        chosen.out.write_text(text, encoding="utf-8")
+    tell(text, chosen.out)
     return 1 if any(one["end"][:2].isupper() for one in entries) else 0
 
 

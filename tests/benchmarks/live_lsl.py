@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from provenance import provenance
+from provenance import provenance, tell
 
 HOLD, REST = 1.0, 2.0
 KILL_EVERY = 30.0
@@ -86,9 +86,7 @@ def main() -> int:
     chosen = options.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         table, sound = measured(chosen.seconds, chosen.window, Path(folder))
-    print(table)
-    if chosen.out is not None:
-        chosen.out.write_text(table, encoding="utf-8")
+    tell(table, chosen.out)
     return 0 if sound else 1
 
 

@@ -20,7 +20,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from provenance import provenance
+from provenance import provenance, tell
 
 from tactile_lab.store.catalogue import Catalogue
 from tactile_lab.store.index import FILE
@@ -144,9 +144,7 @@ lengthens wall time.
 |---|---|---|
 {table}
 """
-    print(text)
-    if asked.out:
-        asked.out.write_text(text, encoding="utf-8")
+    tell(text, asked.out)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from provenance import provenance
+from provenance import provenance, tell
 
 from drivers.picoscope.scope import PicoScope
 from sim_backend.picoscope.scope import UnitModel
@@ -246,9 +246,7 @@ def main() -> None:
         *starved_table(),
     ]
     text = "\n".join(lines) + "\n"
-    print(text)
-    if chosen.out is not None:
-        chosen.out.write_text(text, encoding="utf-8")
+    tell(text, chosen.out)
 
 
 if __name__ == "__main__":

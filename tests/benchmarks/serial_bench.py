@@ -21,7 +21,7 @@ from contextlib import suppress
 from pathlib import Path
 from shutil import which
 
-from provenance import provenance
+from provenance import provenance, tell
 
 from drivers.coil.source import CoilSource
 from sim_backend.coil.source import SimCoilSource
@@ -233,9 +233,7 @@ def main() -> None:
         wire = f"{kind}, {baud} baud, 10 ms to act" if baud else f"{kind}, unpaced"
         lines.append(f"| {wire} | {rate:.0f} | {1e3 * p50:.2f} | {1e3 * p99:.2f} |")
     text = "\n".join(lines) + "\n"
-    print(text)
-    if chosen.out is not None:
-        chosen.out.write_text(text, encoding="utf-8")
+    tell(text, chosen.out)
 
 
 if __name__ == "__main__":

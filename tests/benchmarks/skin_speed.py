@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from provenance import provenance
+from provenance import provenance, tell
 
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
@@ -290,9 +290,7 @@ Of silent ones: sensors of preset table1 under a ball on one spot for {asked.sec
 {same:,} of {asked.taxels:,} random taxels (seed {asked.seed}) of the array of 10,000
 have the spike times of their single simulation to the last bit.
 """
-    if asked.out:
-        asked.out.write_text(text, encoding="utf-8")
-    print(text)
+    tell(text, asked.out)
 
 
 if __name__ == "__main__":

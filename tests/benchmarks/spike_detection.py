@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from provenance import provenance
+from provenance import provenance, tell
 from scipy.signal import find_peaks
 
 from tactile_lab.spikes.detection import Detection
@@ -86,9 +86,7 @@ def main() -> None:
             f"| {peaks / 1e6:,.0f} | {ours / peaks:,.0f} |"
         )
     text = "\n".join([*head("Spike detection", options.samples), *rows, ""])
-    if options.out:
-        options.out.write_text(text, encoding="utf-8")
-    print(text)
+    tell(text, options.out)
 
 
 def head(title: str, millions: int) -> list[str]:

@@ -19,7 +19,7 @@ import h5py
 import hdf5plugin
 import numpy as np
 from numpy.typing import NDArray
-from provenance import provenance
+from provenance import provenance, tell
 
 from tactile_lab.scope import Block, Channel, Stream
 from tactile_lab.store.folder import DATA, RunFolder
@@ -202,9 +202,7 @@ def main() -> None:
             "",
         ]
     )
-    if options.out:
-        options.out.write_text(text, encoding="utf-8")
-    print(text)
+    tell(text, options.out)
 
 
 if __name__ == "__main__":

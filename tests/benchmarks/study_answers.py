@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from provenance import provenance
+from provenance import provenance, tell
 
 from tactile_lab.model.equations import critical_force
 from tactile_lab.model.simulate import simulate
@@ -187,9 +187,7 @@ def main() -> None:
 
 {spread(asked.pairs)}
 {scale()}"""
-    print(text)
-    if asked.out:
-        asked.out.write_text(text, encoding="utf-8")
+    tell(text, asked.out)
 
 
 if __name__ == "__main__":

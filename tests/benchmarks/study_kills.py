@@ -25,7 +25,7 @@ from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 
-from provenance import provenance
+from provenance import provenance, tell
 
 from tactile_lab.errors import LinkLostError, NotFoundError
 from tactile_lab.studies.carry_out import carry_out
@@ -238,9 +238,7 @@ cut.
 |---|---|---|---|
 {chr(10).join(rows)}
 """
-    print(text)
-    if asked.out:
-        asked.out.write_text(text, encoding="utf-8")
+    tell(text, asked.out)
 
 
 if __name__ == "__main__":

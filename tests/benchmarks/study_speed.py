@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 from distributed import LocalCluster
-from provenance import provenance
+from provenance import provenance, tell
 from scipy.integrate import solve_ivp
 
 from tactile_lab import Circuit
@@ -253,9 +253,7 @@ A plain script (`scipy.integrate.solve_ivp`, LSODA at rtol 1e-9, spikes as event
 two processes) computes {rate:.1f} points a second of the same study, from {PLAIN}
 points{", " + AGREES if agrees else "; its spike counts differ"}.
 """
-    if asked.out:
-        asked.out.write_text(text, encoding="utf-8")
-    print(text)
+    tell(text, asked.out)
 
 
 if __name__ == "__main__":

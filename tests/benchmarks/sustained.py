@@ -24,7 +24,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from provenance import provenance
+from provenance import provenance, tell
 
 from drivers.picoscope.scope import PicoScope
 from sim_backend.picoscope.scope import UnitModel
@@ -177,9 +177,7 @@ def main() -> None:
             "",
         ]
     )
-    if options.out:
-        options.out.write_text(text, encoding="utf-8")
-    print(text)
+    tell(text, options.out)
     sys.exit(int(SILENT in text))
 
 

@@ -19,7 +19,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from provenance import provenance
+from provenance import provenance, tell
 
 FRAMES = 60
 LONGEST = 10.0
@@ -141,9 +141,7 @@ def main() -> None:
         row = [f"{np.median(kept[head]):.1f}" for head in heads]
         lines.append(f"| {scale} | {' | '.join(row)} |")
     text = "\n".join(lines) + "\n"
-    if options.out:
-        options.out.write_text(text, encoding="utf-8")
-    print(text)
+    tell(text, options.out)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-import math
 from dataclasses import dataclass
 
 import pytest
+from resistor import Resistor
 
 from drivers.coil.source import CoilSource
 from sim_backend.coil.source import SimCoilSource
@@ -9,30 +9,6 @@ from sim_backend.serial_line.wires import FarEnd, plug_in, unplug
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.instruments.dialects import coil_dialect
-
-
-class Resistor:
-    """A plant without dynamics: 5 Ohm, 11 mT/A."""
-
-    def __init__(self):
-        self.amperes = 0.0
-        self.on = False
-        self.resistance = 5.0
-
-    def set_current(self, time, amperes):
-        self.amperes = amperes
-
-    def output(self, time, on):
-        self.on = on
-
-    def coil_current(self, time):
-        return self.amperes if self.on and math.isfinite(self.resistance) else 0.0
-
-    def coil_voltage(self, time):
-        return self.coil_current(time) * self.resistance
-
-    def field(self, time):
-        return 11e-3 * self.coil_current(time)
 
 
 @dataclass

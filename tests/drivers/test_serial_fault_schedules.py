@@ -6,6 +6,7 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from resistor import Resistor
 
 from drivers.coil.source import CoilSource
 from sim_backend.coil.source import SimCoilSource
@@ -33,22 +34,6 @@ def faults(draw):
     )
 
 
-class Ohm:
-    amperes, on = 0.0, False
-
-    def set_current(self, time, amperes):
-        self.amperes = amperes
-
-    def output(self, time, on):
-        self.on = on
-
-    def coil_current(self, time):
-        return self.amperes * self.on
-
-    def coil_voltage(self, time):
-        return 5 * self.coil_current(time)
-
-
 def session(clock, coil):
     """A short experiment; any error of ours may end it."""
     try:
@@ -67,7 +52,7 @@ def session(clock, coil):
 @given(schedule=st.lists(faults(), max_size=4))
 def test_no_report_is_wrong_and_no_limit_broken(schedule):
     row = coil_dialect("kepco-bop")
-    clock, plant = SimulatedClock(), Ohm()
+    clock, plant = SimulatedClock(), Resistor()
     source = SimCoilSource(plant, row.id, clock)
     end = plug_in(source, row.serial, clock, "coil", schedule)
     coil = CoilSource(row, end.url, CoilLimits(), clock)
@@ -102,7 +87,7 @@ def test_no_report_is_wrong_and_no_limit_broken(schedule):
 def test_without_faults_the_same_session_keeps_the_slew_limit():
     row = coil_dialect("kepco-bop")
     clock = SimulatedClock()
-    source = SimCoilSource(Ohm(), row.id, clock)
+    source = SimCoilSource(Resistor(), row.id, clock)
     coil = CoilSource(row, plug_in(source, row.serial, clock).url, CoilLimits(), clock)
     with clock.taking_part("test"):
         session(clock, coil)

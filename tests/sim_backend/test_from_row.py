@@ -5,6 +5,7 @@ import re
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from resistor import Resistor
 
 from drivers.coil.source import CoilSource
 from drivers.teslameter import Teslameter
@@ -23,25 +24,6 @@ SERIAL = (*dialect_ids("coil"), *dialect_ids("field meter"))
 ROWS = [load_dialect(name) for name in SERIAL]
 COILS = [row for row in ROWS if isinstance(row, CoilDialect)]
 METERS = [row for row in ROWS if not isinstance(row, CoilDialect)]
-
-
-class Resistor:
-    amperes, on = 0.0, False
-
-    def set_current(self, time, amperes):
-        self.amperes = amperes
-
-    def output(self, time, on):
-        self.on = on
-
-    def coil_current(self, time):
-        return self.amperes * self.on
-
-    def coil_voltage(self, time):
-        return 5 * self.coil_current(time)
-
-    def field(self, time):
-        return 11e-3 * self.amperes
 
 
 def wired(row, far_end, clock):
@@ -83,7 +65,7 @@ def test_a_source_made_from_its_row_plays_a_session(row):
 @pytest.mark.parametrize("row", METERS, ids=lambda row: row.id)
 def test_a_meter_made_from_its_row_reads_the_field(row):
     clock, plant = SimulatedClock(), Resistor()
-    plant.amperes = -0.5
+    plant.amperes, plant.on = -0.5, True
     meter = Teslameter(row, wired(row, row_teslameter(plant, row, clock), clock), clock)
     with clock.taking_part("test"):
         meter.open()

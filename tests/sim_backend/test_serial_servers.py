@@ -6,6 +6,7 @@ import time
 
 import pytest
 import serial
+from resistor import Resistor
 
 from drivers.coil.source import CoilSource
 from drivers.teslameter import Teslameter
@@ -29,32 +30,10 @@ PATIENCE = 60.0
 """Longest wait for what a busy machine does late, s."""
 
 
-class Wireless:
-    """A coil of 5 Ohm in which current flows at once."""
-
-    def __init__(self):
-        self.amperes, self.on = 0.0, False
-
-    def set_current(self, time, amperes):
-        self.amperes = amperes
-
-    def output(self, time, on):
-        self.on = on
-
-    def coil_current(self, time):
-        return self.amperes * self.on
-
-    def coil_voltage(self, time):
-        return 5 * self.coil_current(time)
-
-    def field(self, time):
-        return 11e-3 * self.coil_current(time)
-
-
 @pytest.fixture(params=["pty", "tcp"])
 def served(request):
     clock = RealClock()
-    source = SimCoilSource(Wireless(), "kepco-bop", clock)
+    source = SimCoilSource(Resistor(), "kepco-bop", clock)
     end = FarEnd(source, FAST, clock, "coil")
     server = PtyServer(end) if request.param == "pty" else TcpServer(end)
     server.start()
@@ -172,7 +151,7 @@ def test_the_address_of_a_server_that_ended_is_not_given_again():
     clock = RealClock()
     given = set()
     for _ in range(3):
-        source = SimCoilSource(Wireless(), "kepco-bop", clock)
+        source = SimCoilSource(Resistor(), "kepco-bop", clock)
         server = PtyServer(FarEnd(source, FAST, clock, "coil"))
         server.start()
         given.add(server.url)
@@ -184,7 +163,7 @@ def test_seven_bits_on_a_pty_open_again_and_again():
     clock = RealClock()
     row = teslameter_dialect("lakeshore-425")
     wire = row.serial.model_copy(update={"latency": 0.0})
-    end = FarEnd(SimTeslameter(Wireless(), row.id, clock), wire, clock, "meter")
+    end = FarEnd(SimTeslameter(Resistor(), row.id, clock), wire, clock, "meter")
     server = PtyServer(end)
     server.start()
     for _ in range(3):
@@ -227,7 +206,7 @@ def test_a_network_source_that_does_not_accept_holds_nobody_up(monkeypatch):
 def test_pacing_takes_the_time_of_the_wire():
     clock = RealClock()
     wire = KEPCO.serial.model_copy(update={"latency": 0.0, "baud": 9600})
-    end = FarEnd(SimCoilSource(Wireless(), "kepco-bop", clock), wire, clock, "coil")
+    end = FarEnd(SimCoilSource(Resistor(), "kepco-bop", clock), wire, clock, "coil")
     server = PtyServer(end, paced=True)
     server.start()
     with serial.serial_for_url(server.url, timeout=PATIENCE) as port:
@@ -240,7 +219,7 @@ def test_pacing_takes_the_time_of_the_wire():
 
 def test_a_line_without_end_takes_no_memory_and_the_next_is_heard():
     clock = RealClock()
-    end = FarEnd(SimCoilSource(Wireless(), "kepco-bop", clock), FAST, clock, "coil")
+    end = FarEnd(SimCoilSource(Resistor(), "kepco-bop", clock), FAST, clock, "coil")
     for _ in range(30):
         assert end.take(b"x" * 10_000) == []
     assert len(end._partial) < 100_000
