@@ -77,7 +77,8 @@ def main(
     wishes = Preferences(settings, lab, out)
     session = Session(wishes.folder)
     session.run.notes = lab.notes if lab else {}
-    session.run.reports, session.run.publish = wishes.reports, wishes.lsl
+    session.run.reports = wishes.wants("reports")
+    session.run.publish = wishes.wants("lsl")
     wanted = bench or wishes.bench
     if wanted == "none":
         session.link.open()

@@ -39,18 +39,18 @@ class Habits(QObject):
     def follow(self) -> None:
         """The preferences have changed."""
         run, wishes = self._session.run, self._wishes
-        run.reports, run.publish = wishes.reports, wishes.lsl
+        run.reports, run.publish = wishes.wants("reports"), wishes.wants("lsl")
         self._session.keep_in(self._wishes.folder)
         self._screen.list_runs()
 
     def _sound(self, times: int) -> None:
-        if self._wishes.sound:
+        if self._wishes.wants("sound"):
             for number in range(times):
                 QTimer.singleShot(number * APART, QApplication.beep)
 
     def _watch(self) -> None:
         self._wishes.keep(last_bench=self._session.bench.choice or "")
-        if self._wishes.monitor and not self._session.queue.going:
+        if self._wishes.wants("monitor") and not self._session.queue.going:
             self._session.show_monitor(True)
 
     def _remember(self, scene: str) -> None:

@@ -87,25 +87,9 @@ class Preferences(QObject):
         """Scene to begin with: the one that was opened last; None for the demo."""
         return next((str(path) for path in self.recent), None)
 
-    @property
-    def sound(self) -> bool:
-        """Whether the end of a run, and a fault, are heard."""
-        return bool(self._values["sound"])
-
-    @property
-    def monitor(self) -> bool:
-        """Whether the sensor is watched as soon as a bench is ready."""
-        return bool(self._values["monitor"])
-
-    @property
-    def reports(self) -> bool:
-        """Whether a report is written at the end of each run."""
-        return bool(self._values["reports"])
-
-    @property
-    def lsl(self) -> bool:
-        """Whether each run is published by Lab Streaming Layer."""
-        return bool(self._values["lsl"])
+    def wants(self, switch: str) -> bool:
+        """Whether "sound", "monitor", "reports" or "lsl" is switched on."""
+        return bool(self._values[switch])
 
     @property
     def recent(self) -> list[Path]:

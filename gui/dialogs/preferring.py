@@ -74,7 +74,7 @@ class PreferencesCard(Overlay):
         self.folder.setText(str(self._preferences.chosen_folder))
         self.bench.setText(self._preferences.chosen_bench)
         for key, switch in self.switches.items():
-            switch.setChecked(getattr(self._preferences, key))
+            switch.setChecked(self._preferences.wants(key))
         self.open()
         self.folder.setFocus()
 

@@ -30,8 +30,6 @@ QFrame[role="line"] { background: $border; border: 0; max-height: 1px;
 QFrame[role="header"] { background: $header; border: 0; }
 QFrame[role="banner"] { background: $red_soft; border: 1px solid $red;
   border-radius: 8px; }
-QFrame[role="notice"] { background: $amber_soft; border: 1px solid $amber;
-  border-radius: 8px; }
 QLabel { background: transparent; border: 0; }
 QLabel[role="title"] { font-weight: 600; }
 QLabel[role="section"] { font-size: 11px; font-weight: 600; color: $muted;
@@ -119,19 +117,16 @@ QToolButton[role="tab"]:checked { color: $text; border-bottom: 2px solid $accent
 QToolButton[role="tab"]:focus { border: 2px solid $accent; border-radius: 5px;
   padding: 6px 5px 8px 5px; }
 
-QLineEdit, QPlainTextEdit, QComboBox, QAbstractSpinBox { background: $field;
+QLineEdit, QComboBox { background: $field;
   border: 1px solid $control; border-radius: 6px; padding: 3px 8px;
   min-height: 22px; selection-background-color: $accent;
   selection-color: $on_accent; }
-QLineEdit, QPlainTextEdit { placeholder-text-color: $muted; }
-QLineEdit:focus, QPlainTextEdit:focus, QComboBox:focus, QAbstractSpinBox:focus {
+QLineEdit { placeholder-text-color: $muted; }
+QLineEdit:focus, QComboBox:focus {
   border: 2px solid $accent; padding: 2px 7px; }
-QLineEdit:disabled, QComboBox:disabled, QAbstractSpinBox:disabled {
+QLineEdit:disabled, QComboBox:disabled {
   background: $sunken; color: $muted; border-color: $border; }
 QLineEdit[invalid="true"] { border: 2px solid $red; padding: 2px 7px; }
-QAbstractSpinBox::up-button, QAbstractSpinBox::down-button { width: 0; border: 0; }
-QAbstractSpinBox QLineEdit { border: 0; padding: 0; min-height: 0;
-  background: transparent; }
 QComboBox { combobox-popup: 0; }
 QComboBox::drop-down { border: 0; width: 22px; }
 QComboBox::down-arrow { image: url("$arrow"); width: 12px; height: 12px; }

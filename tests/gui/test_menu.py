@@ -27,14 +27,15 @@ def test_preferences_are_kept_from_one_start_to_the_next(
     scene = tmp_path / "mine.toml"
     scene.touch()
     first = Preferences(kept)
-    assert first.folder == Path("runs") and first.bench == "sim" and not first.monitor
+    assert first.folder == Path("runs") and first.bench == "sim"
+    assert first.wants("reports") and not first.wants("monitor")
     first.set(folder="/data/runs", monitor=True, reports=False)
     first.remember(str(scene))
     first.remember(str(tmp_path / "gone.toml"))
     kept.sync()
     second = Preferences(QSettings(kept.fileName(), QSettings.Format.IniFormat))
-    assert second.folder == Path("/data/runs") and second.monitor
-    assert not second.reports and not second.sound
+    assert second.folder == Path("/data/runs") and second.wants("monitor")
+    assert not second.wants("reports") and not second.wants("sound")
     assert second.recent == [scene], "those that are still there"
 
 
