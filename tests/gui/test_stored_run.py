@@ -77,6 +77,16 @@ def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
     lab.until(lambda: says("spikes") == "0" and says("rate") == "0.00")
     view.show_all()
     lab.until(lambda: says("spikes") == "4" and says("force") == "0.0")
+    known = says("V_C1")
+    run.reach = run.length = run.reach + 0.3  # its coil was late to go to 0 A
+    stack.show_source(run)
+    view.set_now(run.reach, run.length)
+    view.show_all()
+    lab.until(lambda: stack.row("V_C2").box.painted.end == run.reach)
+    stack.show_values()
+    for key in ("V_C2", "V_K", "residual"):
+        assert says(key) != "—", "all that was measured has a last value"
+    assert says("V_C1") == known
 
 
 def test_dropped_scene_is_loaded_and_dropped_run_is_opened(lab) -> None:
