@@ -83,11 +83,7 @@ def command(
 
 
 def _word(text: str) -> str:
-    """A tag as it is kept.
-
-    Raises:
-        SceneError: it is empty, or would be two.
-    """
+    """A tag as it is kept."""
     from tactile_lab.errors import SceneError
 
     word = text.strip().removeprefix("#")

@@ -164,11 +164,7 @@ def command(
 
 
 def _asked(scenes: tuple[str, ...], bench: str | None) -> list[SequenceRun]:
-    """What the arguments name.
-
-    Raises:
-        SceneError: nothing, or a file of runs that cannot be used.
-    """
+    """What the arguments name."""
     steps = [step for name in scenes for step in _named(name, bench)]
     if not steps:
         raise SceneError("Name one scene at least, or a file with [[run]] tables.")
@@ -207,11 +203,7 @@ def _named(name: str, bench: str | None) -> Iterator[SequenceRun]:
 
 
 def _resumed(state: Path, scenes: tuple[str, ...]) -> list[SequenceRun]:
-    """The sequence that was begun in that folder.
-
-    Raises:
-        SceneError: there is none that can be read.
-    """
+    """The sequence that was begun in that folder."""
     if scenes:
         raise SceneError(f"--resume goes on with {state}; leave the scenes out.")
     try:
@@ -261,11 +253,7 @@ def _keep(state: Path, steps: list[SequenceRun]) -> None:
 
 
 def _time(text: str) -> datetime:
-    """When that is next.
-
-    Raises:
-        SceneError: it is no time, or has passed.
-    """
+    """When that is next."""
     now = datetime.now()
     try:
         if len(text) <= len("22:00"):

@@ -157,11 +157,7 @@ def _finest(wanted: Waveform, promised: float) -> float:
 
 
 def _lists(_: Scene, coil: CoilSpec) -> ListCapability:
-    """What lists the source plays.
-
-    Raises:
-        LimitError: none.
-    """
+    """What lists the source plays."""
     source = coil_capability(coil)
     if source.lists is None:
         raise LimitError(f"{source.title} plays none.")
@@ -169,11 +165,7 @@ def _lists(_: Scene, coil: CoilSpec) -> ListCapability:
 
 
 def _generated(scene: Scene, coil: CoilSpec) -> GeneratedCurrent:
-    """What currents the scope's generator gives through the source.
-
-    Raises:
-        LimitError: none.
-    """
+    """What currents the scope's generator gives through the source."""
     scope, analogue = scene.bench.scope, coil_capability(coil).analogue
     if analogue is None:
         raise LimitError(
@@ -196,11 +188,7 @@ def _timed(
     before: float,
     can: ListCapability | GeneratedCurrent,
 ) -> Drive:
-    """Played by the clock of source or generator, ahead of the lags that are known.
-
-    Raises:
-        LimitError: it cannot be, and why.
-    """
+    """Played by the clock of source or generator, ahead of the lags that are known."""
     magnet, meter = scene.bench.magnet, scene.bench.field_meter
     if trial.pause:
         raise LimitError("in a pause nothing is recorded.")

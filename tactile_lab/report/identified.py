@@ -96,11 +96,7 @@ def identify_runs(
 
 
 def _evidence(run: RunData, names: Sequence[str]) -> Evidence:
-    """What a run says of the parameters.
-
-    Raises:
-        NotIdentifiableError: it has neither V_C1 nor spikes.
-    """
+    """What a run says of the parameters."""
     trace = run.trace("V_C1")
     if (
         run.circuit is None

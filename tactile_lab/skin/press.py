@@ -129,11 +129,7 @@ def press(
 def _refuse_too_large(
     loads: Loads, role: NDArray[np.uint8], span: FloatArray, folder: Path
 ) -> None:
-    """Refuse what the disk cannot hold, going by some taxels that are tried.
-
-    Raises:
-        RecordingError: there is too little room.
-    """
+    """Refuse what the disk cannot hold, going by some taxels that are tried."""
     array, asked = loads.skin.array, np.flatnonzero(role == kernel.FIRED)
     spikes = len(array.stuck) * array.stuck_rate * loads.skin.duration
     number = min(TRIED, math.ceil(asked.size / (1 << 8)))

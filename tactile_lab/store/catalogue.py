@@ -178,11 +178,7 @@ def summary(path: Path) -> RunSummary:
 
 
 def _check(path: Path, info: Mapping[str, Any]) -> None:
-    """Refuse what no run says of itself, lest one such file stops a list of all.
-
-    Raises:
-        RunFolderError: an entry is of another kind.
-    """
+    """Refuse what no run says of itself, lest one such file stops a list of all."""
     for name, kinds in KINDS.items():
         if (found := info.get(name)) is not None and not isinstance(found, kinds):
             raise RunFolderError(

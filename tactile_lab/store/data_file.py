@@ -152,9 +152,6 @@ def _check_texts(path: Path) -> None:
     """Refuse a heap of texts in which a free place has no length.
 
     HDF5 would look for the place behind it for ever as it reads an attribute.
-
-    Raises:
-        OSError: that is so, or the file cannot be read.
     """
     with path.open("rb") as file:
         begin = file.read(DECLARED)

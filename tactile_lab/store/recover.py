@@ -192,11 +192,7 @@ def _listed(file: h5py.File, name: str) -> dict[int, list[tuple[int, int, int, i
 
 
 def _refuse_if_there_may_be_samples(path: Path, killed: Path) -> None:
-    """Call no run empty whose ledger is damaged: what it says could still be mended.
-
-    Raises:
-        RunFolderError: there is more than a run without samples leaves.
-    """
+    """Call no run empty whose ledger is damaged: what it says could still be mended."""
     size = killed.stat().st_size if killed.exists() else 0
     if size > EMPTY or goes_on(path / LEDGER):
         raise RunFolderError(

@@ -187,11 +187,7 @@ class Run(StoredRun):
 
 
 def _optional(name: str) -> Any:
-    """A library that is installed only where it is wanted.
-
-    Raises:
-        RunFolderError: it is not installed.
-    """
+    """A library that is installed only where it is wanted."""
     try:
         return importlib.import_module(name)
     except ImportError as error:

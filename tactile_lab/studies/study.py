@@ -253,11 +253,7 @@ def _scene(table: StudyFile, folder: Path) -> Scene:
 def _limits(
     asked: Mapping[str, Requirement], keeping: tuple[Kept, ...], origin: str
 ) -> dict[str, Limits]:
-    """What is required, in SI.
-
-    Raises:
-        SceneError: of something that is not kept or is a row, or no number can be so.
-    """
+    """What is required, in SI."""
     by_name = {one.name: one for one in keeping}
     found = {}
     for name, table in asked.items():
