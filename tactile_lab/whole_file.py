@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tactile_lab.errors import RecordingError
+from tactile_lab.errors import RecordingError, TactileLabError
 
 
 def check_space(path: Path, needed: int) -> None:
@@ -28,6 +28,24 @@ def check_space(path: Path, needed: int) -> None:
             f"{path} has {free / 1e9:.2f} GB free but {needed / 1e9:.2f} GB are needed "
             "(run and reserve). Free some space, choose another --out, or record less."
         )
+
+
+@contextmanager
+def failing_as(
+    what: str, advice: str = "", kind: type[TactileLabError] = RecordingError
+) -> Iterator[None]:
+    """Tell of an error of the disk `what` could not be done, and what to do about it.
+
+    Raises:
+        RecordingError: or one of `kind`, with both sentences.
+    """
+    try:
+        yield
+    except TactileLabError:
+        raise
+    except OSError as reason:
+        said = f"{what}: {reason.strerror or reason}. {advice}"
+        raise kind(said.rstrip()) from reason
 
 
 @contextmanager

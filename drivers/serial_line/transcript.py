@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TextIO
 
 from tactile_lab.errors import SceneError
+from tactile_lab.whole_file import failing_as
 
 
 class Transcript:
@@ -31,12 +32,8 @@ class Transcript:
     """
 
     def __init__(self, path: Path, about: str = "") -> None:
-        try:
+        with failing_as(f"Transcript {path} cannot be written", kind=SceneError):
             self._file: TextIO | None = path.open("w", encoding="utf-8")
-        except OSError as reason:
-            raise SceneError(
-                f"Transcript {path} cannot be written: {reason}"
-            ) from reason
         if about:
             self._file.write(f"# {about}\n")
 

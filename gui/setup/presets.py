@@ -14,7 +14,7 @@ import tomli_w
 from tactile_lab.errors import SceneError
 from tactile_lab.scene.load import load
 from tactile_lab.scene.scene import Scene
-from tactile_lab.whole_file import write_text
+from tactile_lab.whole_file import failing_as, write_text
 
 
 def presets(folder: Path, protocol: str) -> dict[str, Path]:
@@ -35,10 +35,8 @@ def save_preset(folder: Path, name: str, scene: Scene) -> Path:
         )
     file = folder / scene.protocol.name / f"{name}.toml"
     text = tomli_w.dumps({"protocol": scene.to_dict()["protocol"]})
-    try:
+    with failing_as(f"The preset {file} was not kept", kind=SceneError):
         write_text(file, text)
-    except OSError as error:
-        raise SceneError(f"The preset {file} was not kept: {error}.") from error
     return file
 
 

@@ -204,6 +204,7 @@ class Day:
         from tactile_lab.errors import SceneError
         from tactile_lab.report.day_one import DayStep, write_day
         from tactile_lab.scene.load import load_bench
+        from tactile_lab.whole_file import failing_as
 
         steps = [
             DayStep(
@@ -219,10 +220,8 @@ class Day:
             for found in (self.done[step.name],)
         ]
         page = self.out / PAGE
-        try:
+        with failing_as(f"{page} cannot be written", kind=SceneError):
             write_day(page, load_bench(self.bench), self.bench, steps, notes)
-        except OSError as reason:
-            raise SceneError(f"{page} cannot be written: {reason}.") from reason
         return page
 
     def _calibrate(self, run: Path) -> None:

@@ -91,7 +91,7 @@ def _draw(planned: Plan, path: Path) -> None:
     from tactile_lab.errors import SceneError
     from tactile_lab.planning.figure import preview_plot
     from tactile_lab.report.canvas import draw
-    from tactile_lab.whole_file import replacing
+    from tactile_lab.whole_file import failing_as, replacing
 
     scene = planned.scene
     figure = draw(
@@ -100,11 +100,9 @@ def _draw(planned: Plan, path: Path) -> None:
         scene.bench.name,
         simulated=scene.bench.simulated or None,
     )
-    try:
-        with replacing(path) as part:
-            figure.savefig(part, dpi=160)
-    except OSError as reason:
-        raise SceneError(f"--preview {path} cannot be written: {reason}.") from reason
+    wrong = failing_as(f"--preview {path} cannot be written", kind=SceneError)
+    with wrong, replacing(path) as part:
+        figure.savefig(part, dpi=160)
 
 
 def _list_keys(scene: Scene, as_json: bool) -> None:

@@ -186,13 +186,10 @@ def record(bench: Bench, folder: Path) -> None:
         SceneError: the files cannot be written.
     """
     from tactile_lab.errors import SceneError
+    from tactile_lab.whole_file import failing_as
 
-    try:
+    with failing_as(f"Transcripts cannot be put into {folder}", kind=SceneError):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as reason:
-        raise SceneError(
-            f"Transcripts cannot be put into {folder}: {reason}"
-        ) from reason
     names = ("coil", "field_meter", "thermometer")
     found = {name: getattr(bench, name) for name in names}
     found |= dict(bench.voltage_sources)

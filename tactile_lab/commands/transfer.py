@@ -55,14 +55,11 @@ def command(
             from tactile_lab.errors import SceneError
             from tactile_lab.report.canvas import draw, save
             from tactile_lab.report.transfer import transfer_plot
+            from tactile_lab.whole_file import failing_as
 
-            try:
-                plot = transfer_plot(read, fit)
-                save(draw(plot, "Transfer curve", curve.name), figure)
-            except OSError as reason:
-                raise SceneError(
-                    f"{figure} cannot be written: {reason.strerror}."
-                ) from reason
+            plot = draw(transfer_plot(read, fit), "Transfer curve", curve.name)
+            with failing_as(f"{figure} cannot be written", kind=SceneError):
+                save(plot, figure)
     found = {"I_S_A": fit.I_S, "m": fit.m, "swing_V_per_decade": fit.swing}
     if as_json:
         print_json(

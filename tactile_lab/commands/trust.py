@@ -24,6 +24,7 @@ def command(run: Path) -> None:
         from tactile_lab.scene.load import read_toml
         from tactile_lab.store.folder import SCENE, digest, read_info
         from tactile_lab.trust import code_named, known_file, remember
+        from tactile_lab.whole_file import failing_as
 
         recorded = read_info(run).get("files") or {}
         code = code_named(read_toml(run / SCENE, "Scene"), run)
@@ -34,11 +35,7 @@ def command(run: Path) -> None:
             if recorded.get(name) != found:
                 state = "NOT AS IT WAS RECORDED"
             say(f"{path}  sha256 {found[:16]}, {state}")
-        try:
+        advice = "Let the environment variable XDG_DATA_HOME name another folder."
+        with failing_as(f"{known_file()} cannot be written", advice, SceneError):
             remember(code)
-        except OSError as reason:
-            raise SceneError(
-                f"{known_file()} cannot be written: {reason.strerror}. Another folder "
-                "is used where the environment variable XDG_DATA_HOME names one."
-            ) from reason
     say("trusted from now on" if code else f"{run} holds no code of anybody's own")

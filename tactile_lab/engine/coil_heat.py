@@ -22,7 +22,7 @@ from tactile_lab.lab import kept_of_port
 from tactile_lab.planning.heat import cool_down
 from tactile_lab.scene.scene import Scene
 from tactile_lab.store.folder import lock
-from tactile_lab.whole_file import write_text
+from tactile_lab.whole_file import failing_as, write_text
 
 BOOT = Path("/proc/sys/kernel/random/boot_id")
 """Where Linux tells one start of the computer from another."""
@@ -121,14 +121,10 @@ class CoilHeat:
             "cold_wall_s": time.time() + left,
             "boot": _boot(),
         }
-        try:
+        what = f"How warm the coil is left cannot be kept in {self.path}"
+        advice = "Let XDG_STATE_HOME name a folder that can be written."
+        with failing_as(what, advice, LimitError):
             write_text(self.path, json.dumps(told))
-        except OSError as reason:
-            raise LimitError(
-                f"How warm the coil is left cannot be kept for the next program: "
-                f"{self.path} cannot be written ({reason}). Let XDG_STATE_HOME name a "
-                "folder that can."
-            ) from reason
 
     def kept_while(
         self,

@@ -10,7 +10,7 @@ from tactile_lab.errors import SceneError
 from tactile_lab.scene.bench_file import BenchSpec
 from tactile_lab.scene.load import load_bench
 from tactile_lab.table import dumped
-from tactile_lab.whole_file import replacing
+from tactile_lab.whole_file import failing_as, replacing
 
 
 def write_bench(text: str, path: Path) -> BenchSpec:
@@ -45,7 +45,7 @@ def write_calibrated_bench(spec: BenchSpec, calibration: Path, path: Path) -> Be
     table = dumped(spec)
     table.pop("file", None)
     table["magnet"]["calibration"] = copy.name
-    try:
+    with failing_as(f"Bench file {path} cannot be written", kind=SceneError):
         contents = calibration.read_bytes()
         if copy.exists() and copy.read_bytes() != contents:
             raise SceneError(
@@ -57,7 +57,3 @@ def write_calibrated_bench(spec: BenchSpec, calibration: Path, path: Path) -> Be
                 part.write_bytes(contents)
                 part.chmod(0o444)
         return write_bench(tomli_w.dumps(table), path)
-    except OSError as reason:
-        raise SceneError(
-            f"Bench file {path} cannot be written: {reason.strerror or reason}."
-        ) from reason

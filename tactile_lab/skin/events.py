@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -17,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.errors import RecordingError, RunFolderError
+from tactile_lab.errors import RunFolderError
 from tactile_lab.store.folder import lock
-from tactile_lab.whole_file import replacing
+from tactile_lab.whole_file import failing_as, replacing
 
 EVENT = np.dtype([("time", np.float64), ("taxel", np.int32)])
 """One event: s, and the number of the taxel."""
@@ -126,13 +125,8 @@ def _remove_left(folder: Path) -> None:
             shutil.rmtree(left, ignore_errors=True)
 
 
-@contextmanager
-def recording() -> Iterator[None]:
-    """Turn a failing disk into an error of the tree."""
-    try:
-        yield
-    except OSError as error:
-        raise RecordingError(f"The events cannot be written: {error}.") from error
+recording = partial(failing_as, "The events cannot be written")
+"""Turns a failing disk into an error of the tree."""
 
 
 @dataclass(frozen=True, eq=False)

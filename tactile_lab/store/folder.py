@@ -7,15 +7,14 @@ import json
 import os
 import re
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import IO, Any, Literal
 
 from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.trust import INFO
-from tactile_lab.whole_file import check_space, write_text
+from tactile_lab.whole_file import check_space, failing_as, write_text
 
 Status = Literal["running", "complete", "aborted", "faulted", "recovered"]
 
@@ -72,7 +71,7 @@ class RunFolder:
         """
         began = datetime.now()
         lost = f"No run folder can be made under {root}"
-        with _refused(lost, "Choose a writable folder with --out."):
+        with failing_as(lost, "Choose a writable folder with --out."):
             root.mkdir(parents=True, exist_ok=True)
             check_space(root, needed + RESERVE)
             path = _unique(root, f"{began:%Y-%m-%d_%H%M%S}_{_plain(name)}")
@@ -97,7 +96,7 @@ class RunFolder:
     def log(self, kind: str, text: str, **entries: Any) -> None:
         """Append one line to the log."""
         line = {"at": _iso(datetime.now()), "kind": kind, "text": text, **entries}
-        with _refused(f"{self.path / LOG} cannot be written"):
+        with failing_as(f"{self.path / LOG} cannot be written"):
             self._log.write(json.dumps(line, ensure_ascii=False, default=str) + "\n")
             self._log.flush()
 
@@ -107,7 +106,7 @@ class RunFolder:
         Its SHA-256 goes into `run.json`, so that a later change shows.
         """
         path = self.path / name
-        with _refused(f"{path} cannot be written"):
+        with failing_as(f"{path} cannot be written"):
             write_text(path, text)
         files = {**self.info.get("files", {}), name: digest(text.encode())}
         self.update(files=files)
@@ -133,7 +132,7 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
         RecordingError: the folder cannot be written.
     """
     text = json.dumps(content, indent=2, ensure_ascii=False, default=str)
-    with _refused(f"{path} cannot be written", "The old one stays."):
+    with failing_as(f"{path} cannot be written", "The old one stays."):
         write_text(path, f"{text}\n", lasting=True)
 
 
@@ -195,19 +194,6 @@ def is_live(path: Path) -> bool:
             return not lock(log, shared=True)
     except OSError:
         return False  # no log, or none that may be read: nobody here can be its writer
-
-
-@contextmanager
-def _refused(what: str, advice: str = "") -> Iterator[None]:
-    """Say of an error of the disk `what` could not be done, and what to do about it."""
-    try:
-        yield
-    except RecordingError:
-        raise
-    except OSError as error:
-        raise RecordingError(
-            f"{what}: {error.strerror or error}. {advice}".rstrip()
-        ) from error
 
 
 def _iso(time: datetime) -> str:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import io
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -15,7 +14,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.errors import RecordingError, RunFolderError
+from tactile_lab.errors import RunFolderError
 from tactile_lab.store.certificate import redetect, write_certificate
 from tactile_lab.store.columns import Column, SampleColumn
 from tactile_lab.store.data_file import open_data
@@ -32,8 +31,12 @@ from tactile_lab.store.layout import RECORDS
 from tactile_lab.store.ledger import LEDGER, LedgerContents, goes_on, read_ledger
 from tactile_lab.store.progress import Progress, nothing, share
 from tactile_lab.store.run import Run
-from tactile_lab.whole_file import check_space
+from tactile_lab.whole_file import check_space, failing_as
 
+ELSEWHERE = (
+    "Copy it to where there is room and the right to write, and recover it there."
+)
+"""What to do with a run that cannot be written where it is."""
 KEPT = "data.killed.h5"
 """What the file is called that the crash left."""
 
@@ -98,7 +101,7 @@ def recover(path: Path, progress: Progress = nothing) -> Recovered:
         written.rows["segments"] = _told_by(killed).rows.get("segments", [])
     check_space(path, killed.stat().st_size + RESERVE)
     new = path / "data.recovering.h5"
-    with _writing(path):
+    with failing_as(f"{path} cannot be written", ELSEWHERE):
         try:
             new.write_bytes(written.declared)
             with h5py.File(new, "r+", libver="latest") as file:
@@ -115,17 +118,6 @@ def recover(path: Path, progress: Progress = nothing) -> Recovered:
     if listed.declared:  # else somebody may have a better copy of it
         (path / LEDGER).unlink()
     return recovery
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise RecordingError(
-            f"{path} cannot be written: {error.strerror or error}. Copy it to where "
-            "there is room and the right to write, and recover it there."
-        ) from error
 
 
 def _told_by(killed: Path) -> LedgerContents:
@@ -206,7 +198,7 @@ def _refuse_if_there_may_be_samples(path: Path, killed: Path) -> None:
 def _without_samples(path: Path, info: dict[str, Any]) -> Recovered:
     """A run that died before its first sample."""
     kept = None
-    with _writing(path):
+    with failing_as(f"{path} cannot be written", ELSEWHERE):
         if (path / DATA).exists():
             kept = (path / DATA).rename(path / KEPT)
         (path / LEDGER).unlink(missing_ok=True)

@@ -17,12 +17,13 @@ from tactile_lab.errors import RecordingError
 from tactile_lab.planning.plan import plan
 from tactile_lab.store.folder import lock
 from tactile_lab.studies.addresses import addresses
-from tactile_lab.studies.dataset import Gathered, gathered, is_written, write
+from tactile_lab.studies.dataset import KEPT, Gathered, gathered, is_written, write
 from tactile_lab.studies.live import LOCK, LiveStudy
 from tactile_lab.studies.points import RUNS, Points, PointTask
 from tactile_lab.studies.shelf import Shelf
 from tactile_lab.studies.study import Study
 from tactile_lab.studies.workers import Finished, InProcess, Workers, workers
+from tactile_lab.whole_file import failing_as
 
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
@@ -145,13 +146,9 @@ def carry_out(
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
     """Let nobody else carry out the study of this folder meanwhile."""
-    try:
+    with failing_as(f"{folder} cannot be written", "Name another folder."):
         folder.mkdir(parents=True, exist_ok=True)
         file = (folder / LOCK).open("w", encoding="utf-8")
-    except OSError as reason:
-        raise RecordingError(
-            f"{folder} cannot be written: {reason.strerror}. Name another folder."
-        ) from reason
     with file:
         late = time.monotonic() + PATIENCE
         while not lock(file):
@@ -189,13 +186,10 @@ def _carried_out(
         live.end()
     found = gathered(study, shelf, shelf.find(named))
     if missing.size or not is_written(study, out / study.name):
-        try:
+        with failing_as(
+            f"The data set cannot be written into {out / study.name}", KEPT
+        ):
             write(found, out / study.name)
-        except OSError as reason:
-            raise RecordingError(
-                f"The data set cannot be written into {out / study.name}: {reason}. "
-                "All points are kept; make room and start the study again."
-            ) from reason
     return found
 
 

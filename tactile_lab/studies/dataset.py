@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import xarray
 
 DATA = "data.zarr"
+KEPT = "All points are kept; make room and start the study again."
+"""What to do where the disk fails."""
 MADE_OF = "made_of"
 """Attribute that tells of which study a data set is; see `study_digest`."""
 

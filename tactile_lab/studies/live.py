@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.errors import RecordingError, RunFolderError
+from tactile_lab.errors import RunFolderError
 from tactile_lab.plot import Plot
 from tactile_lab.quantity import count, show
 from tactile_lab.scene.load import load
@@ -24,7 +24,7 @@ from tactile_lab.studies.figures import plots
 from tactile_lab.studies.points import BY_POINT, RUNS
 from tactile_lab.studies.shelf import Shelf
 from tactile_lab.studies.study import Study
-from tactile_lab.whole_file import write_text
+from tactile_lab.whole_file import failing_as, write_text
 
 LIVE, RESULTS, LOCK = "live.json", "results.json", ".lock"
 """Files in a study's folder: while it is computed, once it is finished, and the one
@@ -170,13 +170,9 @@ class SeenStudy:
 
 
 def _write(file: Path, scene: Scene) -> None:
-    try:
+    advice = "Make room, or make the folder writable."
+    with failing_as(f"{file} cannot be written", advice):
         write_text(file, scene.to_toml())
-    except OSError as reason:
-        raise RecordingError(
-            f"{file} cannot be written: {reason.strerror}. Make room, or make the "
-            "folder writable."
-        ) from reason
 
 
 def studies_in(*roots: Path) -> list[Path]:

@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from tactile_lab.conclusion import Conclusion
-from tactile_lab.errors import RecordingError
 from tactile_lab.quantity import show
 from tactile_lab.store.folder import write_json
 from tactile_lab.studies.addresses import study_digest
 from tactile_lab.studies.axes import Axis
-from tactile_lab.studies.dataset import MADE_OF, Gathered, is_written
+from tactile_lab.studies.dataset import KEPT, MADE_OF, Gathered, is_written
 from tactile_lab.studies.live import RESULTS, SHOWN, shown
 from tactile_lab.studies.study import Study
-from tactile_lab.whole_file import write_text
+from tactile_lab.whole_file import failing_as, write_text
 
 REPORT = "report.html"
 MARKS = {"model": "Circuit model", "simulated": "Simulated bench", "bench": "Measured"}
@@ -30,13 +29,8 @@ def write_page(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
     Raises:
         RecordingError: the folder cannot be written.
     """
-    try:
+    with failing_as(f"The report cannot be written into {folder}", KEPT):
         return _written(found, folder)
-    except OSError as reason:
-        raise RecordingError(
-            f"The report cannot be written into {folder}: {reason}. All points are "
-            "kept; make room and start the study again."
-        ) from reason
 
 
 def _written(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.errors import RecordingError
 from tactile_lab.studies.addresses import ADDRESS, NAME
 from tactile_lab.studies.column import Column, Rows, placed
+from tactile_lab.whole_file import failing_as
 
 DAMAGED = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
 """What reading a file raises that is not whole."""
@@ -142,7 +142,8 @@ def put(batch: Batch, folder: Path) -> Path:
     path = folder / f"{name.hexdigest()}.npz"
     # another study on this shelf may write the same batch
     part = path.with_suffix(f".{os.getpid()}.part")
-    try:
+    advice = "What was finished before is kept; make room and start the study again."
+    with failing_as(f"{path} cannot be written", advice):
         folder.mkdir(parents=True, exist_ok=True)
         with part.open("wb") as file:
             np.savez(file, **_arrays(batch))  # type: ignore[arg-type] # names ours
@@ -154,11 +155,6 @@ def put(batch: Batch, folder: Path) -> Path:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
-    except OSError as reason:
-        raise RecordingError(
-            f"{path} cannot be written: {reason.strerror or reason}. What was "
-            "finished before is kept; make room and start the study again."
-        ) from reason
     return path
 
 
