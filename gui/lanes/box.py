@@ -135,7 +135,6 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         self.levels: list[float] = []
         self.wanted: float | None = None
         self.axis = ValueAxis(stage, self)
-        self.sigRangeChangedManually.connect(self._lock)
         self.forget()
 
     @property
@@ -154,8 +153,15 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         self.locked, self.painted = False, Painted()
         self.setRange(xRange=(0, 1), yRange=(0, 1))
 
-    def _lock(self) -> None:
-        self.locked = True
+    def choose_range(self, *, locked: bool = True) -> None:
+        """Before a hand changes the range: what is seen is kept for the way back."""
+        self._stage.view.note()
+        self.locked = locked
+
+    def mouseDragEvent(self, ev: Any, axis: int | None = None) -> None:
+        """A drag on the axis moves the range."""
+        self.choose_range()
+        super().mouseDragEvent(ev, axis)
 
     def place(self, top: float, bottom: float, right: float) -> None:
         """Take the plot's place in the scene, px."""
@@ -181,7 +187,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         """Zoom the values by `factor` (above 1: in) about a height in the scene, px."""
         low, high = self.shown
         about = self.value_at(y)
-        self._lock()
+        self.choose_range()
         self.setYRange(
             about - (about - low) / factor, about + (high - about) / factor, padding=0
         )
@@ -190,7 +196,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         """Look at higher values, by a part of the range; at lower ones below 0."""
         low, high = self.shown
         by = part * (high - low)
-        self._lock()
+        self.choose_range()
         self.setYRange(low + by, high + by, padding=0)
 
     def show_between(self, low: float, high: float, *, locked: bool = True) -> None:

@@ -338,7 +338,7 @@ class LaneScene(pg.GraphicsView):  # type: ignore[misc]
         if at.x() >= AXIS:
             self.stage.view.show_all()
         elif box is not None:
-            box.locked = False
+            box.choose_range(locked=False)
         self.refresh()
 
     def leaveEvent(self, event: QEvent) -> None:

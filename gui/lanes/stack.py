@@ -271,7 +271,7 @@ class LaneStack(QFrame):
         menu.setAccessibleName(lane.plain)
 
         def lock(on: bool) -> None:
-            box.locked = on
+            box.choose_range(locked=on)
             self.refresh()
 
         def levels(new: Sequence[float] = ()) -> None:

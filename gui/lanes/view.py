@@ -65,7 +65,7 @@ class TimeView(QObject):
 
     def show_span(self, start: float, width: float) -> None:
         """Show a window; following ends."""
-        self._note()
+        self.note()
         longest = max(self.length, self.now) * 1.25 + 1.0
         self.width = min(max(width, SHORTEST), longest)
         self.start = min(max(start, -0.2 * self.width), longest)
@@ -74,8 +74,8 @@ class TimeView(QObject):
             self.follow_changed.emit(False)
         self.changed.emit()
 
-    def _note(self) -> None:
-        """Keep where we are for the way back; one drag or turn of the wheel is one."""
+    def note(self) -> None:
+        """Keep what is seen for the way back; one drag or turn of the wheel is one."""
         now = self.clock()
         if now - self._noted > PAUSE:
             self._before = [*self._before[-KEPT:], self._seen]

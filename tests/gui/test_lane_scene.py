@@ -104,6 +104,7 @@ def test_plots_lie_beside_their_cards(app, stack):
 def test_the_wheel_zooms_values_of_one_lane_and_its_range_stays(app, stack, how):
     lane, other = box(stack, "V_C1"), box(stack, "V_K")
     before, beside, time = span(lane), other.shown, stack.view.width
+    stack.view.clock = lambda: 1e9  # long after the view was chosen
     if how == "axis":
         wheel(stack, middle(stack, "V_C1", AXIS / 2))
     else:
@@ -111,7 +112,12 @@ def test_the_wheel_zooms_values_of_one_lane_and_its_range_stays(app, stack, how)
     settle(app)
     assert np.isclose(span(lane), before / 1.25)
     assert other.shown == beside and stack.view.width == time
-    kept = lane.shown
+    kept, seen = lane.shown, (stack.view.start, stack.view.width)
+    stack.view.back()
+    settle(app)
+    assert np.isclose(span(lane), before), "values alone are a step back"
+    assert (stack.view.start, stack.view.width) == seen and not lane.locked
+    stack.view.forward()
     stack.view.show_span(0.0, 20.0)
     settle(app)
     assert lane.shown == kept
@@ -119,12 +125,19 @@ def test_the_wheel_zooms_values_of_one_lane_and_its_range_stays(app, stack, how)
 
 def test_a_drag_on_the_axis_moves_the_values_and_a_double_click_ends_it(app, stack):
     lane = box(stack, "V_C1")
-    before = lane.shown
+    before, seen = lane.shown, stack.view.start
+    stack.view.clock = lambda: 1e9  # long after the view was chosen
     at = middle(stack, "V_C1", AXIS / 2)
     drag(stack, at, at + QPoint(0, 20))
     settle(app)
     assert np.isclose(span(lane), before[1] - before[0]) and lane.shown[0] > before[0]
     assert lane.locked
+    stack.view.back()
+    settle(app)
+    assert lane.shown == before and not lane.locked, "the drag is taken back"
+    assert stack.view.start == seen
+    stack.view.forward()
+    settle(app)
     QTest.mouseDClick(stack.scene.viewport(), LEFT, pos=at)
     settle(app)
     assert lane.shown == before and not lane.locked
