@@ -108,12 +108,15 @@ class ModelOutcome(Outcome):
             ("codes", {}),
             ("_model", model),
             ("looked_at", False),
+            ("fired", 0),
         ):
             object.__setattr__(self, name, value)
 
     _model: ModelAlong
     looked_at: bool
     """Whether anything of the model was asked for: what follows may depend on it."""
+    fired: int
+    """Spikes, where these were asked for; else 0."""
 
     @property
     def spike_times(self) -> FloatArray:
@@ -126,7 +129,9 @@ class ModelOutcome(Outcome):
             )
         spikes = self._found("spikes").spike_times
         end = self.start + self.trial.length
-        return spikes[(spikes >= self.start) & (spikes < end)] - self.start
+        mine = spikes[(spikes >= self.start) & (spikes < end)] - self.start
+        object.__setattr__(self, "fired", int(mine.size))
+        return mine
 
     @property
     def current(self) -> FloatArray:

@@ -78,7 +78,7 @@ class Plan:
             self.scene,
             self.needs,
             self.timeline,
-            0 if spikes is None else int(spikes.size),
+            self.timeline.spikes if spikes is None else int(spikes.size),
             self.estimate.update_interval,
         )
 

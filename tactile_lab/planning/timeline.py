@@ -35,6 +35,7 @@ class Timeline:
         warnings: where the coil cannot follow.
         adaptive: the protocol looked at what the sensor did, so that another sensor
             may get other trials.
+        spikes: that the model gave in the trials whose spikes it looked at.
     """
 
     steps: tuple[Step, ...]
@@ -42,6 +43,7 @@ class Timeline:
     duration: float
     warnings: tuple[str, ...]
     adaptive: bool
+    spikes: int
 
     @property
     def streamed(self) -> float:
@@ -213,6 +215,7 @@ class _Driver:
             self._time,
             tuple(self._told()),
             any(outcome.looked_at for outcome in self._outcomes),
+            sum(outcome.fired for outcome in self._outcomes),
         )
 
     def _told(self) -> Iterator[str]:

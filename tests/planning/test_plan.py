@@ -6,6 +6,7 @@ from importlib import resources
 import pytest
 
 from tactile_lab.errors import LimitError, SceneError
+from tactile_lab.planning.computing import slowness
 from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan, text
 from tactile_lab.scene.load import load
@@ -315,6 +316,26 @@ def test_what_a_run_computes_is_the_sum_of_its_parts_and_each_can_be_left_out():
     left = cost.seconds - without.computing.seconds
     assert saved["V_C2"].seconds == pytest.approx(left)
     assert without.computing.memory < cost.memory
+
+
+def test_what_a_source_meter_and_the_fits_of_a_trim_cost_is_foreseen():
+    """Without a preview too; it took 5.7 s on a computer of 0.62 (plan-figures.md)."""
+    planned = plan(load("threshold_trim"))
+    cost = planned.computing
+    assert 9.2 / 1.5 < cost.seconds / slowness() < 9.2 * 1.5
+    assert planned.preview is None and planned.timeline.spikes > 0
+    assert "source meters" in cost.time
+
+
+def test_a_search_is_foreseen_where_the_scene_has_its_bench_deviate():
+    planned = plan(load("surprise"))
+    cost, saved = planned.computing, {s.what: s for s in planned.savings}
+    assert cost.time["search for a cause"] > 1.4 * slowness()
+    less = plan(load("surprise", ["record.compare=false"])).computing
+    left = cost.seconds - less.seconds
+    assert saved["model beside the run"].seconds == pytest.approx(left)
+    assert "search for a cause" not in less.time
+    assert "search for a cause" not in plan(load()).computing.time
 
 
 def test_a_drain_current_keeps_the_v_c1_that_it_is_derived_from():
