@@ -23,7 +23,7 @@ class ToolTips(QObject):
         """Show a long plain text in lines of its own; whether that was done."""
         if not isinstance(event, QHelpEvent) or not isinstance(watched, QWidget):
             return False  # classes first: this sees every event there is
-        text = watched.toolTip()
+        text = watched.toolTip().replace("`", "")  # marks of a terminal
         if event.type() != QEvent.Type.ToolTip or "<" in text:
             return False
         if all(len(line) <= LONGEST for line in text.splitlines()):

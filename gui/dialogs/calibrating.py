@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
 
 from gui.dialogs.bench_text import BenchChoice
 from gui.look.theme import Theme
-from gui.parts import STRETCH, column, label, line, line_edit, push, row
+from gui.parts import STRETCH, column, label, line, line_edit, push, row, say
 from gui.plots.small_plot import SmallPlot
 from gui.review.conclusion import ShownConclusion
 from gui.review.live_plots import loop_plot
@@ -70,7 +70,7 @@ class Calibrating(QWidget):
 
     def show_progress(self, text: str, *, busy: bool) -> None:
         """Say how far the calibration is."""
-        self.progress.setText(text)
+        say(self.progress, text)
         self.field.setEnabled(not busy)
         if busy:
             self.findings.hide()

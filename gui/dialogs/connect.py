@@ -229,7 +229,7 @@ class Connect(Overlay):
         ):
             button.setEnabled(not reason)
             button.setToolTip(reason)
-            page.progress.setText(reason or ended)
+            say(page.progress, reason or ended)
 
     def _say_progress(self, text: str, *, busy: bool) -> None:
         page = self.wiring if self._running == self._wiring else self.calibration

@@ -21,6 +21,7 @@ from gui.parts import (
     line_edit,
     push,
     row,
+    say,
     set_role,
 )
 from tactile_lab.engine.threads import start
@@ -159,8 +160,7 @@ class InstrumentsPage(QWidget):
     def _show_test(self, role: str, good: bool, text: str) -> None:
         answer = self.answers[role]
         set_role(answer, "muted" if good else "error")
-        answer.setText(text)
-        answer.show()
+        say(answer, text)
 
     def _test(self, role: str, port: Combo, row: Combo) -> None:
         address, dialect = port.currentText().strip(), row.currentText()

@@ -76,7 +76,7 @@ class Wiring(QWidget):
 
     def show_progress(self, text: str, *, busy: bool) -> None:
         """Say how far the check is; a check in progress cannot be asked for again."""
-        self.progress.setText(text)
+        say(self.progress, text)
         self.check.setEnabled(not busy)
         if busy and self._concluded is not None:
             self._concluded = None

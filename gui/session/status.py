@@ -38,6 +38,8 @@ class Status(QObject):
 
     def set_fault(self, title: str, consequence: str) -> None:
         """Something went wrong; a person must read it before anything goes on."""
+        # commands are marked by back-ticks, as a terminal is used to
+        title, consequence = title.replace("`", ""), consequence.replace("`", "")
         self.faulted.emit()
         self.fault = FaultNotice(title, consequence)
         self._log.add(Severity.ERROR, "safety", f"{title} {consequence}", safety=True)

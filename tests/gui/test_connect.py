@@ -130,6 +130,7 @@ def test_instrument_is_tried_out_and_says_so_below_its_row(lab) -> None:
     page.test_meter.click()
     lab.until(lambda: page.answers["meter"].property("role") == "error")
     assert "not-there" in page.answers["meter"].text()
+    assert "`" not in page.answers["meter"].text()
     served.close()
     page.deleteLater()
 

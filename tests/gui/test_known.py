@@ -54,6 +54,8 @@ def test_a_source_that_is_gone_while_idle_becomes_a_fault(
     source.served.close()
     served.bench.look()
     until(served, lambda: served.state is WindowState.FAULT)
+    assert "tactile-lab devices" in served.status.fault.consequence
+    assert "`" not in served.status.fault.consequence, "a window is no terminal"
     assert Lamp.GOOD not in lamps(served), "nothing green that nobody answered for"
     assert run_problem(served.snapshot(), form_problem="")
     served.acknowledge()
