@@ -93,7 +93,7 @@ class Chips:
             CoilKnowledge.UNKNOWN: Lamp.BAD,
             CoilKnowledge.LIVE: Lamp.ACTIVE,
             CoilKnowledge.FALLING: Lamp.WAITING,
-            CoilKnowledge.OFF: Lamp.BAD if state is WindowState.FAULT else idle,
+            CoilKnowledge.OFF: idle,
         }[what]
         value = "—" if coil.current is None else milliamperes(coil.current)
         sent = coil.setpoint is not None

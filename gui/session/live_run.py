@@ -215,7 +215,7 @@ class LiveRun(LiveTask):
         if not off.verified:
             status.set_fault("The coil's state is unknown after the run.", off.text)
         elif done.state is events.RunState.FAULTED:
-            kept = f"{done.duration:.1f} s of data kept in {folder.name}. "
+            kept = f"What was recorded in {done.duration:.1f} s is in {folder.name}. "
             left = f"Coil off, {milliamperes(off.current)} read back."
             status.set_fault(done.reason or "The run faulted.", kept + left)
         else:

@@ -122,6 +122,7 @@ def test_a_run_that_begins_during_a_look_waits_for_its_end(
 def test_what_answered_before_a_fault_is_not_green_after_it(served: Session) -> None:
     served.status.set_fault("Something broke.", "")
     assert Lamp.GOOD not in lamps(served)
+    assert Lamp.BAD not in lamps(served), "a source that is verified off did not break"
     served.acknowledge()
     until(served, lambda: served.state is WindowState.READY)
     assert Lamp.GOOD in lamps(served), "it was asked"
