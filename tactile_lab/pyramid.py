@@ -96,7 +96,7 @@ class Level:
     def around(self, start: float, end: float) -> Trace:
         """What a picture of [start, end] s needs: one more cell on either side."""
         time = self._values[0, self._first : self._last]
-        first, last = self._first + np.searchsorted(time, [start, end])
+        first, last = (self._first + time.searchsorted((start, end))).tolist()
         return self._cells(max(self._first, first - 1), min(last + 1, self._last))
 
     def _cells(self, first: int, last: int) -> Trace:
@@ -213,8 +213,8 @@ class Pyramid:
         part = self._part(start, end)
         if part is None:
             return True
-        exact = np.array_equal(part.low, part.high)  # nothing more to be seen in it
-        return not exact and part.width > (end - start) / count
+        # in one that is flat there is nothing more to be seen
+        return not part.flat and part.width > (end - start) / count
 
     def refine(self, start: float, end: float, part: Trace) -> None:
         """Put in a closer look at [start, end] s."""

@@ -114,6 +114,11 @@ class Trace:
         """End of the last cell, s; 0 without one."""
         return float(self.time[-1]) + self.width if self.time.size else 0.0
 
+    @cached_property
+    def flat(self) -> bool:
+        """Whether each cell holds one value; also without cells."""
+        return self.low is self.high or bool((self.low == self.high).all())
+
     @property
     def extent(self) -> tuple[float, float] | None:
         """Least and largest value; None without cells."""
@@ -181,8 +186,8 @@ class Trace:
 
     def around(self, start: float, end: float) -> Trace:
         """What a picture of [start, end] s needs: one more cell on either side."""
-        first, last = np.searchsorted(self.time, [start, end])
-        return self[max(0, int(first) - 1) : int(last) + 1]
+        first, last = self.time.searchsorted((start, end)).tolist()
+        return self[max(0, first - 1) : last + 1]
 
     def join(self, other: Trace) -> Trace:
         """This trace, then another that begins where this one ends, or later.
@@ -259,29 +264,26 @@ class Trace:
             return self
         edges = np.arange(first or per, self.time.size, per)
         edges = np.concatenate([(0,), edges, (self.time.size,)])
-        breaks = np.flatnonzero(self.gap)[1:]
+        breaks = self.gap.nonzero()[0][1:]
         if self.width:
             missing = self.time[breaks] - self.time[breaks - 1] - self.width
             breaks = breaks[missing > (per - 0.5) * self.width]
         if breaks.size:
             edges = np.union1d(edges, breaks)
-        edges, counts = edges[:-1], np.diff(edges)
-        return replace(
-            self,
-            time=self.time[edges],
-            low=np.minimum.reduceat(self.low, edges),
-            high=np.maximum.reduceat(self.high, edges),
-            mean=np.add.reduceat(self.mean, edges) / counts,
-            gap=self.gap[edges],
-            width=per * self.width,
-        )
+        edges, counts = edges[:-1], edges[1:] - edges[:-1]
+        low = np.minimum.reduceat(self.low, edges)
+        high = np.maximum.reduceat(self.high, edges)
+        mean = np.add.reduceat(self.mean, edges) / counts
+        time, gap, width = self.time[edges], self.gap[edges], per * self.width
+        return Trace(time, low, high, mean, gap, width, self.signal, self.unit)
 
     def scaled(self, by: float, unit: str = "") -> Trace:
         """All values `by` times as large, `by` above 0; in another unit."""
         if by == 1.0 or self.empty:
             return self
         low, high, mean = self.low * by, self.high * by, self.mean * by
-        return replace(self, low=low, high=high, mean=mean, unit=unit or self.unit)
+        time, gap, unit = self.time, self.gap, unit or self.unit
+        return Trace(time, low, high, mean, gap, self.width, self.signal, unit)
 
     def shifted(self, by: float) -> Trace:
         """`by` s later."""
@@ -289,7 +291,8 @@ class Trace:
 
     def means(self) -> Trace:
         """The line of means, without extremes."""
-        return replace(self, low=self.mean, high=self.mean)
+        time, mean, gap = self.time, self.mean, self.gap
+        return Trace(time, mean, mean, mean, gap, self.width, self.signal, self.unit)
 
     # --- differences
 

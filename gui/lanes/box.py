@@ -16,7 +16,7 @@ from gui.lanes.compare import MARKS
 from gui.lanes.floor import AXIS, GUTTER, LaneContext, row_names, rows_of
 from gui.lanes.lane import BAND, Lane
 from gui.lanes.paint import Frame
-from gui.lanes.readings import Painted, values_at
+from gui.lanes.readings import COARSE, FINE, Painted, values_at
 from gui.lanes.source import Source
 from gui.look.tokens import Tokens
 from gui.plots.axis import guarded
@@ -401,8 +401,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         shown = measured[first:last]
         x, y = frame.x(shown.time), frame.y(shown.mean)
         rates = self.lane.key == "rate" and x.size <= DOTS
-        samples = np.array_equal(shown.low, shown.high)
-        if rates or (samples and x.size > 1 and np.diff(x).min() >= APART):
+        if rates or (shown.flat and x.size > 1 and np.diff(x).min() >= APART):
             paint.dots(on.painter, x, y, colour)
 
     def _laws(self, on: Drawing) -> None:
@@ -464,7 +463,8 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         if not self.lane.valued:
             return
         edge = source.right_edge(self._stage.view)
-        value = values_at(self.lane, source, edge, self.painted)[0]
+        widest = COARSE if source.running else FINE
+        value = values_at(self.lane, source, edge, self.painted, widest)[0]
         if value is None or edge < frame.start:
             return
         y = min(max(frame.y1(value), frame.top + 8), frame.bottom - 8)

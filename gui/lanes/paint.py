@@ -63,12 +63,12 @@ class Frame:
     def x(self, time: FloatArray) -> FloatArray:
         """Pixels of times."""
         per = (self.right - self.left) / (self.end - self.start)
-        return np.clip(self.left + (time - self.start) * per, -FAR, FAR)
+        return _near(self.left + (time - self.start) * per)
 
     def y(self, value: FloatArray) -> FloatArray:
         """Pixels of values."""
         per = (self.bottom - self.top) / (self.high - self.low)
-        return np.clip(self.bottom - (value - self.low) * per, -FAR, FAR)
+        return _near(self.bottom - (value - self.low) * per)
 
     def x1(self, time: float) -> float:
         """Pixel of one time."""
@@ -79,6 +79,11 @@ class Frame:
         """Pixel of one value."""
         per = (self.bottom - self.top) / (self.high - self.low)
         return min(max(self.bottom - (value - self.low) * per, -FAR), FAR)
+
+
+def _near(pixels: FloatArray) -> FloatArray:
+    """Those beyond `FAR` as `FAR`; `np.clip` takes four times as long to say so."""
+    return np.minimum(np.maximum(pixels, -FAR), FAR)
 
 
 def polygon(x: FloatArray, y: FloatArray) -> QPolygonF:
@@ -134,8 +139,8 @@ def trace(painter: QPainter, frame: Frame, shown: Trace, line: QPen) -> None:
     """Draw a decimated trace, broken at gaps."""
     if shown.empty:
         return
-    starts = np.flatnonzero(shown.gap)
-    if shown.low is shown.high or np.array_equal(shown.low, shown.high):
+    (starts,) = shown.gap.nonzero()
+    if shown.flat:
         x, y = shown.time, shown.low
     else:
         (x, y), starts = zigzag(shown), 2 * starts
@@ -208,7 +213,7 @@ def envelope(painter: QPainter, frame: Frame, shown: Trace, colour: str) -> None
     A line up and down through every pixel column: Qt fills polygons of so many corners
     ten times more slowly.
     """
-    if shown.empty or np.array_equal(shown.low, shown.high):
+    if shown.flat:
         return
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     trace(painter, frame, shown, pen(colour))

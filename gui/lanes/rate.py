@@ -21,7 +21,7 @@ def rate_of(
     The spike that begins a stretch of firing has no point; the next begins a new line.
     More than 4 `count` points become about `count` columns.
     """
-    first, last = np.searchsorted(spikes, [start, end])
+    first, last = spikes.searchsorted((start, end)).tolist()
     # one more on either side to join to, and what tells whether it begins a stretch
     low, high = max(0, first - 3), min(spikes.size, last + 3)
     times = spikes[low:high]

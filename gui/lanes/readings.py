@@ -20,6 +20,9 @@ NEAR = 0.02
 FEW = 40
 """In so many columns."""
 
+FINE, COARSE = 2 * NEAR / FEW, 0.02
+"""Widest columns of a picture that values are read from, s; while it moves."""
+
 
 def newest(lane: Lane, source: Source) -> float | None:
     """The newest value in shown units; None without data."""
@@ -52,22 +55,26 @@ class Painted:
     end: float = 0.0
     runs: tuple[Trace, ...] = ()
 
-    def close(self, lane: Lane, time: float) -> bool:
-        """Whether the value at a time can be read from it."""
+    def close(self, lane: Lane, time: float, widest: float = FINE) -> bool:
+        """Whether the value at a time can be read: no column is above `widest` s."""
         inside = bool(self.runs) and self.start <= time <= self.end
-        fine = all(run.step <= 2 * NEAR / FEW for run in self.runs)
-        return inside and (fine or lane.symmetric)
+        fine = lane.symmetric or all(run.step <= widest for run in self.runs)
+        return inside and fine
 
 
 def values_at(
-    lane: Lane, source: Source, time: float, painted: Painted
+    lane: Lane,
+    source: Source,
+    time: float,
+    painted: Painted,
+    widest: float = FINE,
 ) -> tuple[float | None, ...]:
     """Values at a time, one for each run, in shown units; None where there are none.
 
     They are those of the picture, so that numbers and traces do not disagree, but where
-    a column of it is a mean over long.
+    a column of it is a mean over more than `widest` s.
     """
-    runs = painted.runs if painted.close(lane, time) else ()
+    runs = painted.runs if painted.close(lane, time, widest) else ()
     values: list[float | None] = []
     shown = runs or source.shown(lane, time - NEAR, time + NEAR, FEW)
     inside = painted.runs and painted.start <= time <= painted.end

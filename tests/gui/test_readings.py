@@ -99,6 +99,9 @@ def test_a_wide_column_is_not_read_as_a_value() -> None:
     assert not wide.close(LANES["V_C1"], 50.0)
     near = Painted(0.0, 1.0, (Trace.line(time / 100 / 8, time),))
     assert near.close(LANES["V_C1"], 0.5) and not near.close(LANES["V_C1"], 1.5)
+    moving = Painted(0.0, 5.0, (Trace.line(time / 20, time),))
+    assert moving.close(LANES["V_C1"], 2.5, 0.03), "a tag is where the trace ends"
+    assert not moving.close(LANES["V_C1"], 2.5), "a number tells what is there"
     assert not Painted().close(LANES["V_C1"], 0.0), "nothing was painted"
 
 
