@@ -106,6 +106,7 @@ from tactile_lab.model.tableau import ORDER
 from tactile_lab.model.taylor import (
     MOST,
     ROWS,
+    degree_for,
     end_at,
     expanded,
     fastest,
@@ -177,6 +178,7 @@ def _build(stamp: int) -> Callable[..., Any]:
         f, g, m = flow_room(), flow_room(), flow_room()
         a, b, part, d = series_room(), series_room(), series_room(), series_room()
         c, step = taylor_room(), step_room()
+        full = degree_for(SHARE * tolerance)
         for k in range(time.size - 1 if status == DONE else 0):
             T = time[k + 1] - time[k]
             if T < SHORTEST_SEGMENT:
@@ -232,8 +234,9 @@ def _build(stamp: int) -> Callable[..., Any]:
                 stiff = stiff or short >= PATIENCE
                 if not stiff:
                     degree = expanded(
-                        s, room, y, v, held, V0, p, rate, wanted, par, f, g, c, step
-                    )
+                        s, room, y, v, held, V0, p, rate, wanted, full, par, f, g, c,
+                        step,
+                    )  # fmt: skip
                     S[ITERATIONS] += 1.0
                     h = step[LENGTH]
                     short = (

@@ -2,14 +2,17 @@
 
 All coefficients follow from the state by recursion, as every function in the equations
 solves a differential equation itself: x = exp(g) has x' = x g', and Wright's omega w of
-z has w' = z' w/(1 + w). Time is counted in units of the fastest rate, so that no
-coefficient leaves the range of numbers. What either voltage at the start moves
-needs no such digits: it is Magnus's exponential of the Jacobian, of order 4.
+z has w' = w g' with g' = z' - w', for w + ln w = z. Time is counted in units of the
+fastest rate, so that no coefficient leaves the range of numbers. What either voltage at
+the start moves needs no such digits: it is Magnus's exponential of the Jacobian, of
+order 4.
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
@@ -53,13 +56,14 @@ from tactile_lab.model.transistor import (
 
 LEAST, MOST = 10, 30
 """Lowest and highest degree of a series."""
+PER = 1.0 / np.arange(1.0, MOST + 1.0)
 SAFETY = 2.0
-Y, V, TO_Y, TO_V, G, B, Q, X, APART, Z, W, U = range(12)
+Y, V, TO_Y, TO_V, G, B, Q, P, APART, W, LOG = range(11)
 """Rows: V_C1 and V_C2, V; their slopes, V per unit; slope of V_P; B;
-exp(-V_C1/V_T) - 1; J/I_T1s; slope of V_C2 - V_C1; of z; omega or, with "direct",
-I_F + I_T1s; w/(1 + w)."""
-ROWS = 12
-NOTHING = 1e-26
+exp(-V_C1/V_T) - 1; 1 + J/I_T1s and the slope of its logarithm, (V_C2 - V_C1)/V_T;
+omega or, with "direct", I_F + I_T1s, and the slope of its logarithm."""
+ROWS = 11
+NOTHING = 1e-20
 """A junction's exponential below this is left out: the rest of its series is, too."""
 
 
@@ -107,10 +111,10 @@ def expand_B(
 ) -> int:
     """Fill the rows G and B from B's first; returns the last that is not nothing."""
     c[G, 0] = unit * (p - V_P / par[TAU])
-    least = 1e-20 * c[B, 0]
+    least, leak = 1e-20 * c[B, 0], -unit / par[TAU]
     for k in range(degree):
-        c[B, k + 1] = par[PER_VOLT] * product(c, G, B, k) / (k + 1)
-        c[G, k + 1] = -unit / par[TAU] * c[G, k] / (k + 1)
+        c[B, k + 1] = par[PER_VOLT] * product(c, G, B, k) * PER[k]
+        c[G, k + 1] = leak * c[G, k] * PER[k]
         if max(abs(c[B, k]), abs(c[B, k + 1])) <= least:
             for j in range(k, degree + 1):
                 c[B, j] = 0.0
@@ -119,81 +123,107 @@ def expand_B(
 
 
 @inner
+def slopes_known(c: FloatArray, k: int) -> tuple[float, float]:
+    """Coefficient k of the slopes of P and W but for what it takes APART and LOG there.
+
+    Both at once, of two sums each: none waits for another.
+    """
+    of_P = of_W = more_P = more_W = 0.0
+    j = k % 2
+    if j:
+        of_P, of_W = c[APART, 0] * c[P, k], c[LOG, 0] * c[W, k]
+    while j < k:
+        of_P += c[APART, j] * c[P, k - j]
+        of_W += c[LOG, j] * c[W, k - j]
+        more_P += c[APART, j + 1] * c[P, k - j - 1]
+        more_W += c[LOG, j + 1] * c[W, k - j - 1]
+        j += 2
+    return of_P + more_P, of_W + more_W
+
+
+@inner
 def expand(
     s: float, y: float, v: float, held: bool, V0: float, p: float, unit: float,
     degree: int, par: FloatArray, f: FloatArray, c: FloatArray,
 ) -> None:  # fmt: skip
     """Fill the rows of `c` at s after the segment's start, where `flow` is f."""
-    c[B, 0], c[Q, 0], c[X, 0], c[W, 0] = f[OF_B], f[OF_Q], f[OF_X], f[OF_W]
+    c[B, 0], c[Q, 0] = f[OF_B], f[OF_Q]
     few = expand_B(V_P_at(s, V0, p, par[TAU]), p, unit, degree, par, c)
     v_t, leak, direct = par[V_T], par[I_S1], par[DIRECT] != 0.0
-    to_a, to_c2 = unit / par[T1_C1], unit / par[T1_C2]
     per_t = 1.0 / v_t
-    r = 1.0 + par[PER_R]
+    open_1 = 1.0 + c[Q, 0] > NOTHING
+    W_0, P_0 = f[OF_W], 1.0 + f[OF_X]
+    P_0 = P_0 if P_0 > NOTHING else 0.0
+    # what each coefficient of P and W gives to both slopes
+    to_a, to_c2 = unit / par[T1_C1], 0.0 if held else unit / par[T1_C2]
     per_w = 1.0 if direct else v_t / ((1.0 + par[PER_F]) * par[R_E])
-    c[Y, 0], c[V, 0] = y, v
-    open_1, open_2 = 1.0 + c[Q, 0] > NOTHING, 1.0 + c[X, 0] > NOTHING
-    per_u = 0.0
-    if not direct:
-        per_u = 1.0 / (1.0 + c[W, 0])
-        c[U, 0] = c[W, 0] * per_u
-    leak_1, to_z = unit * par[LAMBDA], par[R_E] * leak * per_t
-    leak_2 = unit / par[TAU_L]
+    P_to_y, P_to_v = to_a * leak * par[PER_R], -to_c2 * leak * (1.0 + par[PER_R])
+    W_to_y, W_to_v = to_a * per_w * par[PER_F], to_c2 * per_w
+    leak_1, leak_2 = unit * par[LAMBDA], 0.0 if held else unit / par[TAU_L]
+    # what stands still, of no further coefficient
+    still_y = leak_1 * par[DIVIDER] - to_a * leak * (par[PER_F] + par[PER_R])
+    still_v = to_c2 * (par[T1_BIAS] + leak * par[PER_R])
+    # what they give to those of P and W: with R3, z' = to_z P' - V_C1'/V_T
+    emitter = 0.0 if direct else 1.0
+    to_z = emitter * par[R_E] * leak * per_t
+    own = 1.0 / (1.0 + emitter * W_0)
+    by = P_0 * per_t
+    known_P, by_v = own * W_0 * to_z, own * W_0 * to_z * by
+    by_y = by_v + own * W_0 * per_t
+    c[Y, 0], c[V, 0], c[P, 0], c[W, 0] = y_k, v_k, P_k, W_k = y, v, P_0, W_0
     for k in range(degree):
-        per = 1.0 / (k + 1)
-        I_F, J = per_w * c[W, k], leak * c[X, k]
+        per = PER[k]
+        of_P, of_W = slopes_known(c, k)
         closing = 0.0
         if open_1:
             for j in range(min(k, few) + 1):
                 closing += c[B, j] * c[Q, k - j]
         else:
             closing = -c[B, k]
-        to_y = unit * closing - leak_1 * c[Y, k]
-        if k == 0:
-            I_F -= leak
-            to_y += leak_1 * par[DIVIDER]
-        to_y += to_a * (I_F * par[PER_F] + J * par[PER_R])
-        to_v = 0.0
-        if not held:
-            to_v = to_c2 * (I_F - J * r) - leak_2 * c[V, k]
-            if k == 0:
-                to_v += to_c2 * par[T1_BIAS]
-        c[TO_Y, k], c[TO_V, k] = to_y, to_v
-        c[Y, k + 1], c[V, k + 1] = per * to_y, per * to_v
-        c[Q, k + 1] = c[X, k + 1] = 0.0
+        # the last coefficients at last: all else waits for them
+        to_y = (unit * closing + still_y - leak_1 * y_k + P_to_y * P_k) + W_to_y * W_k
+        to_v = (still_v - leak_2 * v_k + P_to_v * P_k) + W_to_v * W_k
+        still_y = still_v = 0.0
+        to_W = (own * of_W + known_P * of_P) + (by_v * to_v - by_y * to_y)
+        to_P = of_P + by * (to_v - to_y)
+        y_k, v_k, P_k, W_k = per * to_y, per * to_v, per * to_P, per * to_W
+        c[TO_Y, k], c[TO_V, k], c[APART, k] = to_y, to_v, (to_v - to_y) * per_t
+        c[LOG, k] = (to_z * to_P - to_y * per_t) - emitter * to_W
+        c[Y, k + 1], c[V, k + 1], c[P, k + 1], c[W, k + 1] = y_k, v_k, P_k, W_k
+        c[Q, k + 1] = 0.0
         if open_1:
             c[Q, k + 1] = -per * per_t * (product(c, TO_Y, Q, k) + to_y)
-        if open_2:
-            c[APART, k] = apart = -to_y if held else to_v - to_y
-            c[X, k + 1] = per * per_t * (product(c, APART, X, k) + apart)
-        if direct:
-            c[W, k + 1] = -per * per_t * product(c, TO_Y, W, k)
-            continue
-        c[Z, k] = to_z * (k + 1) * c[X, k + 1] - to_y * per_t
-        c[W, k + 1] = w = per * product(c, Z, U, k)
-        c[U, k + 1] = 0.0
-        c[U, k + 1] = (w - product(c, W, U, k + 1)) * per_u
+    # sums take two terms at a time
+    c[TO_Y, degree] = c[TO_V, degree] = 0.0
+    for n in range(ROWS):
+        c[n, degree + 1] = 0.0
 
 
 @inner
-def two_at(
-    c: FloatArray, one: int, two: int, degree: int, x: float
-) -> tuple[float, float]:
-    """Two of the series at x units."""
-    a, b = c[one, degree], c[two, degree]
-    for k in range(degree - 1, -1, -1):
-        a, b = a * x + c[one, k], b * x + c[two, k]
-    return float(a), float(b)
+def four_at(
+    c: FloatArray, one: int, two: int, three: int, four: int, degree: int, x: float
+) -> tuple[float, float, float, float]:
+    """Four of the series at x units: even and odd terms apart, none waits for long."""
+    top, square = degree - degree % 2, x * x
+    a, b, p, q = c[one, top], c[two, top], c[three, top], c[four, top]
+    top += 1
+    odd_a, odd_b, odd_p, odd_q = c[one, top], c[two, top], c[three, top], c[four, top]
+    for k in range(top - 3, -1, -2):
+        a, odd_a = a * square + c[one, k], odd_a * square + c[one, k + 1]
+        b, odd_b = b * square + c[two, k], odd_b * square + c[two, k + 1]
+        p, odd_p = p * square + c[three, k], odd_p * square + c[three, k + 1]
+        q, odd_q = q * square + c[four, k], odd_q * square + c[four, k + 1]
+    return a + x * odd_a, b + x * odd_b, p + x * odd_p, q + x * odd_q
 
 
 @inner
 def reached(c: FloatArray, degree: int, wanted: float) -> float:
     """How far the series go before their last two terms exceed `wanted`, units."""
-    far = 1e300
+    far = 600.0
     for k in (degree - 1, degree):
         size = max(abs(c[Y, k]), abs(c[V, k]), 1e-300)
-        far = min(far, (wanted / size) ** (1.0 / k))
-    return far
+        far = min(far, math.log(wanted / size) / k)
+    return math.exp(far)
 
 
 @inner
@@ -260,11 +290,15 @@ def moved(
 def end_at(
     s: float, x: float, unit: float, held: bool, V0: float, p: float, degree: int,
     par: FloatArray, c: FloatArray, g: FloatArray, step: FloatArray,
-) -> None:  # fmt: skip
-    """Let the step end after x units; g becomes `flow` there."""
-    y, v = two_at(c, Y, V, degree, x)
+) -> tuple[float, float]:  # fmt: skip
+    """Let the step end after x units; g becomes `flow` there.
+
+    Returns the slopes of both series there, V per unit.
+    """
+    y, v, to_y, to_v = four_at(c, Y, V, TO_Y, TO_V, degree, x)
     step[Y_END], step[V_END] = y, v
     flow(B_at(V_P_at(s + x * unit, V0, p, par[TAU]), par), y, v, held, par, g)
+    return to_y, to_v
 
 
 @inner
@@ -276,19 +310,18 @@ def move(
 
     In the middle the series tell it.
     """
-    junction_2, junction_1 = two_at(c, X, W, degree, 0.5 * x)
-    B_m, Q_m = two_at(c, B, Q, degree, 0.5 * x)
-    y, v = two_at(c, Y, V, degree, 0.5 * x)
-    of_junctions(junction_2, junction_1, par, m)
-    with_node_a(B_m, Q_m, 1.0 + Q_m, y, v, held, par, m)
+    P_m, W_m, B_m, Q_m = four_at(c, P, W, B, Q, degree, 0.5 * x)
+    of_junctions(P_m - 1.0, W_m, par, m)
+    # of the Jacobian, not the slopes: it depends on no voltage but by these
+    with_node_a(B_m, Q_m, 1.0 + Q_m, 0.0, 0.0, held, par, m)
     moved(x * unit, f, m, g, step)
 
 
 @inner
 def expanded(
     s: float, room: float, y: float, v: float, held: bool, V0: float, p: float,
-    rate: float, wanted: float, par: FloatArray, f: FloatArray, g: FloatArray,
-    c: FloatArray, step: FloatArray,
+    rate: float, wanted: float, degree: int, par: FloatArray, f: FloatArray,
+    g: FloatArray, c: FloatArray, step: FloatArray,
 ) -> int:  # fmt: skip
     """A step from s, where `flow` is f, that misses `wanted` V; returns its degree.
 
@@ -296,16 +329,14 @@ def expanded(
     there, which are left in `g`. It takes `room` s at most. Returns 0 where none is
     short enough.
     """
-    degree = degree_for(wanted)
     unit = 1.0 / rate
     expand(s, y, v, held, V0, p, unit, degree, par, f, c)
     x = reached(c, degree, wanted)
     step[LENGTH] = (x if x > 0.1 else 0.1) * unit
     x = min(x, longest(degree), room * rate)
     for _ in range(8):
-        end_at(s, x, unit, held, V0, p, degree, par, c, g, step)
+        to_y, to_v = end_at(s, x, unit, held, V0, p, degree, par, c, g, step)
         share = SAFETY * x / (degree + 1)
-        to_y, to_v = two_at(c, TO_Y, TO_V, degree - 1, x)
         left_1 = share * abs(unit * g[TO_A] - to_y)
         left_2 = share * abs(unit * g[TO_C2] - to_v)
         if max(left_1, left_2) <= 3.0 * wanted:
