@@ -40,7 +40,13 @@ from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
 
 IN_CARDS = ("PgUp", "PgDown", "Return", "Enter")
-"""Keys that act within an open card, too."""
+"""Single keys that act within an open card, too."""
+
+BELOW_CARDS = frozenset(
+    "Ctrl+R Ctrl+Return Ctrl+Shift+Return Ctrl+Z Ctrl+Y Ctrl+Shift+Z Ctrl+M Ctrl+N "
+    "Ctrl+F Ctrl+1 Ctrl+2 Ctrl+3 Ctrl+4".split()
+)
+"""Keys that act on what an open card hides, or lead there: not while it is open."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +133,11 @@ class Actions(QObject):
         for key in self.keys:
             for keys in () if key.single else key.keys:
                 shortcut = QShortcut(QKeySequence(keys), window)
-                shortcut.activated.connect(lambda key=key: key.act())
+                shortcut.activated.connect(partial(self._act, key, keys))
+
+    def _act(self, key: Shortcut, pressed: str) -> None:
+        if self._card() is None or pressed not in BELOW_CARDS:
+            key.act()
 
     def take_key(self, event: QKeyEvent) -> bool:
         """A key no widget wanted; whether it was one of the single ones.

@@ -314,7 +314,13 @@ def test_one_undo_takes_back_what_was_typed_in_one_stay(lab) -> None:
     lab.until(lambda: edit.text() == before)
     QTest.keyClick(edit, Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier)
     lab.until(lambda: edit.text() == "600 ms")
-    setup.form.edits.undo()
+    undo = Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier
+    lab.window.actions_.show_help()
+    QTest.keyClick(lab.window, *undo)
+    assert edit.text() == "600 ms", "not where a card hides the form"
+    QTest.keyClick(lab.window, Qt.Key.Key_Escape)
+    QTest.keyClick(lab.window, *undo)
+    lab.until(lambda: edit.text() == before)
 
 
 def test_queue_can_be_edited_while_running(lab) -> None:
