@@ -278,9 +278,10 @@ def bars(
     left, right = round(frame.left), round(frame.right)
     x = np.round(frame.x(times)).astype(np.int64) - left
     x = x[(x >= 0) & (x <= right - left)]
-    filled = np.bincount(x, minlength=right - left + 1) > 0
-    edges = np.diff(filled.astype(np.int8), prepend=0, append=0)
-    begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+    filled = np.zeros(right - left + 3, np.int8)
+    filled[x + 1] = 1
+    edges = filled[1:] - filled[:-1]
+    (begins,), (ends,) = (edges > 0).nonzero(), (edges < 0).nonzero()
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(line.color())
     top, height = span[0], span[1] - span[0]
