@@ -141,7 +141,10 @@ def restart(
     B: float, y: float, par: FloatArray, E: FloatArray, S: FloatArray,
     f: FloatArray, g: FloatArray,
 ) -> float:  # fmt: skip
-    """End the reset: V_C2 = V_reset; an error in its time becomes one of voltages."""
+    """End the reset: V_C2 = V_reset; an error in its time becomes one of voltages.
+
+    Leaves `flow` after it in f.
+    """
     v: float = par[V_RESET]
     flow(B, y, v, True, par, g)
     flow(B, y, v, False, par, f)
@@ -388,7 +391,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     v = restart(
                         B_at(V_P_at(s, V0, p, par[TAU]), par), y, par, E, S, f, g
                     )
-                    known, short, stiff = False, 0, False
+                    known, short, stiff = True, 0, False
             S[Y], S[VOLTAGE] = y, v
             if status != DONE:
                 break
