@@ -153,7 +153,7 @@ class ProgressStrip(QWidget):
         if trial is None:
             self._say("Opening instruments")
         else:
-            total = f" of {len(holds)}" if holds else ""
+            total = f" of {len(holds)}" if trial[0] < len(holds) else ""
             self._say(f"Step {trial[0] + 1}{total} · {trial[1]}")
         left = max(0.0, length - reach)
         share = 100 * reach / max(length, 1e-9)

@@ -152,8 +152,10 @@ class ResultsView(QWidget):
         self.mark.setVisible(bool(steps) or running)
         many = count(len(steps), "step")
         if running:
-            of = f" of {total}" if total else ""
-            self.mark.setText(f"preliminary · {len(steps)}{of} steps")
+            # a protocol may go on for longer than was planned
+            known = 0 < total >= len(steps)
+            of = f"{len(steps)} of {total} steps" if known else many
+            self.mark.setText(f"preliminary · {of}")
         else:
             self.mark.setText(f"{'final' if whole else 'partial'} · {many}")
         set_role(self.mark, "pill-ok" if whole and not running else "pill-warn")

@@ -7,10 +7,13 @@ import pytest
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication, QFrame, QScrollArea
 
+from gui.lanes.expected import Stretch
 from gui.look.theme import Theme
+from gui.record.progress import ProgressStrip
 from gui.review.live_plots import COLUMNS, column_plot, rate_plot
 from gui.review.results import ResultsView
 from gui.session.fit import FitInput, fit
+from gui.state import Snapshot, WindowState
 from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial
 
@@ -43,6 +46,22 @@ def test_steps_without_a_level_are_said_to_be_none(app) -> None:
     assert "No steps yet" not in view.plot.nothing
     names = [one.name for one in view.trains.plot.panels[0].series]
     assert names == ["100 Hz, no. 2", "100 Hz, no. 1"]
+
+
+def test_a_run_longer_than_planned_is_not_beyond_its_end(app) -> None:
+    """Looks at rest that were not over made it "15 of 14 steps"."""
+    view = ResultsView(Theme("light"))
+    strip = ProgressStrip(Theme("light"))
+    holds = [Stretch(0.0, 1.0, "a"), Stretch(1.0, 2.0, "b")]
+    for total, results, steps in (
+        (3, "preliminary · 3 of 3 steps", "Step 2 of 2 · b"),
+        (2, "preliminary · 3 steps", "Step 3 · b"),
+    ):
+        view.show_steps([SILENT, SLOW, FAST], total=total, running=True, whole=False)
+        assert view.mark.text() == results
+        running = Snapshot(WindowState.RUNNING)
+        strip.show_run(running, holds, 2.0, 1.0, (4 - total, "b"), "")
+        assert strip.text.startswith(steps)
 
 
 def test_a_force_that_comes_again_is_joined_by_no_line_of_the_model() -> None:
