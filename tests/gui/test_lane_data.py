@@ -1,9 +1,10 @@
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gui.lanes.expected import Aligned, Preview, Stretch
-from gui.lanes.live import Readings
+from gui.lanes.live import LiveSource, Readings
 from gui.lanes.paint import zigzag
 from gui.lanes.rate import rate_of
 from gui.plots.numbers import decimals, nice_range, number, signed, ticks
@@ -223,3 +224,30 @@ def test_ticks_are_round() -> None:
         "0.0",
         "0.0",
     ]
+
+
+@pytest.mark.parametrize("later", [1, 200])  # s; of 131 the finest are kept
+def test_what_is_frozen_has_nothing_that_came_later(later: int) -> None:
+    source = LiveSource(None, 1.0)
+
+    def go_on(start: float, end: float) -> None:
+        time = np.arange(start, end - 5e-4, 1e-3)
+        flat = np.full(time.size, end)
+        source.add_bins({"V_C1": Trace.bins(time, flat, flat, flat, 1e-3)})
+        source.add_current(end - 0.1, end)
+        source.add_spikes((end - 0.2,))
+
+    go_on(0.0, 1.0)
+    frozen = source.frozen()
+    for start in range(1, 1 + later):
+        go_on(start, start + 1.0)
+    assert source.reach == pytest.approx(1.0 + later)
+    assert frozen.reach == pytest.approx(1.0) and frozen.of is source
+    assert frozen.spikes.tolist() == [0.8]
+    for start, end in ((0.0, 1e4), (0.0, 1.2), (0.9, 1.1)):
+        force = frozen.measured("force", start, end, 500)
+        voltage = frozen.measured("V_C1", start, end, 500)
+        for found in (force, voltage):
+            assert 0.95 < found.end <= frozen.reach + 1e-9, (start, end)
+            assert found.extent == (1.0, 1.0)
+    assert frozen.measured("V_C1", 2.0, 3.0, 500).empty

@@ -248,15 +248,9 @@ def test_freeze_holds_the_lanes_while_acquisition_goes_on(lab) -> None:
     window.page.setFocus()
     QTest.keyClick(window, Qt.Key.Key_Space)
     seen, shown = view.now, window.centre.stack.source
-    signals, end = ("force", "V_C1", "V_K"), 1e4
-    before = [shown.measured(one, 0.0, end, 500) for one in signals]
-    ends = [one.end for one in before]
-    assert max(ends) <= seen + 1e-9 and min(ends) > 0.9, (seen, ends)
     lab.until(lambda: session.source.reach > seen + 1.0)
     assert view.now == seen
-    assert window.centre.stack.source is shown and shown.reach <= seen
-    for signal, was in zip(signals, before, strict=True):  # which a zoom would show
-        assert shown.measured(signal, 0.0, end, 500).end == was.end, signal
+    assert window.centre.stack.source is shown and shown.reach == seen
     window.centre.tools.freeze.click()
     assert window.centre.stack.source is session.source
     lab.until(lambda: view.now > seen + 1.0)
