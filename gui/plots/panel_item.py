@@ -176,7 +176,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         ]
 
     def _heading(self, text: str) -> str:
-        """What is along y, then mark and name of each series."""
+        """What is along y, mark and name of each series, and what the panel is of."""
         parts = [_rich(text, self._tokens.muted)]
         for s in self._panel.series:
             if s.mark == "cells":
@@ -184,6 +184,8 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
             elif s.name:
                 mark = _rich(GLYPHS.get(s.mark, "—"), self._colour(s.colour))
                 parts.append(f"{mark}&nbsp;{_rich(s.name, self._tokens.text)}")
+        if self._panel.note:
+            parts.append(_rich(self._panel.note, self._tokens.muted))
         return " &nbsp; ".join(parts)
 
     def _colours(self, s: Series) -> str:
@@ -240,8 +242,13 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
             return
         pale = QColor(colour)
         if s.low is not None and s.high is not None:
-            pale.setAlphaF(1.0 if s.mark == "range" else 0.22)
-            self._fill(x, self._y(s.low), self._y(s.high), pale)
+            low, high = self._y(s.low), self._y(s.high)
+            if s.mark in POINTS:  # what lies between two of them is not known
+                ends = np.column_stack([low, high]).ravel()
+                self._line(np.repeat(x, 2), ends, self._tokens.muted, connect="pairs")
+            else:
+                pale.setAlphaF(1.0 if s.mark == "range" else 0.22)
+                self._fill(x, low, high, pale)
         if s.mark in ("range", "band"):
             return
         y = self._y(s.y)

@@ -45,6 +45,38 @@ def rates(top: float) -> Plot:
     return Plot(name="rates", caption="", x_label="force", x_unit="N", panels=(panel,))
 
 
+def test_a_note_of_a_panel_is_told(app):
+    """Two panels of scans at two speeds, of which nothing said which was which."""
+    panel = rates(1.0).panels[0]
+    notes = ("8 mm/s", "18 mm/s")
+    panels = tuple(replace(panel, note=note) for note in notes)
+    view = SmallPlot(Theme("dark"))
+    view.show_plot(replace(rates(1.0), panels=panels))
+    told = [
+        [item.text for item in one.items if isinstance(item, pg.LabelItem)]
+        for one in view.panels
+    ]
+    assert all(note in "".join(texts) for note, texts in zip(notes, told, strict=True))
+
+
+def test_intervals_of_points_are_not_joined_to_a_band(app):
+    """Three vector strengths stood in a band, as if those between were known."""
+    series = Series(x=[1, 2, 3], y=[5, 5, 5], low=[1, 2, 3], high=[9, 8, 7])
+    for mark, filled in (("points", 0), ("dots", 0), ("line", 1)):
+        panel = Panel(label="rate", unit="Hz", series=(replace(series, mark=mark),))
+        view = SmallPlot(Theme("light"))
+        view.show_plot(replace(rates(1.0), panels=(panel,)))
+        drawn = view.panels[0].box.addedItems
+        bands = [i for i in drawn if isinstance(i, pg.FillBetweenItem)]
+        bars = [
+            i for i in drawn
+            if isinstance(i, pg.PlotCurveItem) and i.opts["connect"] == "pairs"
+        ]  # fmt: skip
+        assert (len(bands), len(bars)) == (filled, 1 - filled)
+        if bars:
+            assert bars[0].getData()[1].tolist() == [1, 9, 2, 8, 3, 7]
+
+
 def test_one_value_but_for_rounding_has_an_axis_that_can_be_read(app) -> None:
     """Twelve touches of 160 mN stood at 159.99995, 160.00000 and 160.00005."""
     force = (0.16, 0.16 * (1 + 1e-9), 0.16)
