@@ -242,13 +242,13 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
             return
         pale = QColor(colour)
         if s.low is not None and s.high is not None:
-            low, high = self._y(s.low), self._y(s.high)
+            below, above = self._y(s.low), self._y(s.high)
             if s.mark in POINTS:  # what lies between two of them is not known
-                ends = np.column_stack([low, high]).ravel()
-                self._line(np.repeat(x, 2), ends, self._tokens.muted, connect="pairs")
+                bars = np.column_stack([below, above]).ravel()
+                self._line(np.repeat(x, 2), bars, self._tokens.muted, connect="pairs")
             else:
                 pale.setAlphaF(1.0 if s.mark == "range" else 0.22)
-                self._fill(x, low, high, pale)
+                self._fill(x, below, above, pale)
         if s.mark in ("range", "band"):
             return
         y = self._y(s.y)
