@@ -133,7 +133,9 @@ class ManualView(QWidget):
     def follow(self, manual: LiveManual) -> None:
         """Show what was asked of the coil, unless somebody is about to ask anew."""
         asked = manual.current
-        if manual.alive and not manual.opened:
+        if not manual.alive:
+            say(self._problem, "")  # the entry it was of is gone
+        elif not manual.opened:
             self.force.setText("opening the source …")
         edited = self.current.isModified() or self.current.hasFocus()
         if not edited and not self.slider.isSliderDown():

@@ -172,9 +172,13 @@ def test_manual_control_shows_live_and_stop_ends_it(lab) -> None:
     assert "100 mA" in window.closing.now.text()
     assert "remaining" not in window.closing.now.text(), "that was the run's"
     window.closing.keep.click()
+    window.review.manual.current.setText("5 A")
+    window.review.manual.set.click()
     window.header.stop.click()
     lab.until(lambda: not session.manual.alive)
     assert session.coil_view().verified_off
+    window.render_state()
+    assert not window.review.manual._problem.text(), "said of an entry that is gone"
 
 
 def test_the_lanes_show_the_coil_while_it_is_driven_by_hand(lab) -> None:
