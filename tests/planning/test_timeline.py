@@ -105,10 +105,10 @@ def test_an_adaptive_protocol_gets_the_models_answer(protocol):
 def test_each_press_is_solved_once_however_many_there_are(monkeypatch):
     solved = 0.0
 
-    def counted(*given):
+    def counted(time, force, until, k_F, par, memory, *rest):
         nonlocal solved
-        solved += given[4] - given[2]  # from, force there, until
-        return run(*given)
+        solved += until - memory[kernel.TIME]
+        return run(time, force, until, k_F, par, memory, *rest)
 
     run = kernel.run
     monkeypatch.setattr(kernel, "run", counted)
