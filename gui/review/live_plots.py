@@ -73,12 +73,8 @@ def rate_plot(
         trials: the steps so far.
         model: force, N, and peak rate, Hz, of the model's steps.
     """
-    steps = [
-        (t.level, t.response.peak_rate or 0.0, t.response.final_rate or 0.0)
-        for t in trials
-        if t.level is not None
-    ]
-    if not any(peak for _, peak, _ in steps):
+    steps = [(t.level, *t.response.rates) for t in trials if t.level is not None]
+    if not any(peak > 0 for _, peak, _ in steps):
         return None
     force, peak, final = np.array(sorted(steps)).T
     # the same force twice is two results, not a line between them

@@ -174,7 +174,7 @@ def fit(findings: Sequence[MeasuredTrial], seen: FitInput) -> Fit:
             _adaptation(steps, model),
             _fall(steps, model),
         )
-    points = tuple((f.level or 0.0, f.response.peak_rate or 0.0) for f in model)
+    points = tuple((f.level or 0.0, f.response.rates[0]) for f in model)
     apart = {
         signal: found
         for signal, (measured, model_) in seen.voltages.items()

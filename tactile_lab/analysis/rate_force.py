@@ -67,7 +67,7 @@ def slopes(forces: Sequence[float], rates: Sequence[float]) -> FloatArray:
     """Slopes of rate between neighbouring forces, shape (n - 1,), Hz/N.
 
     Args:
-        forces: N, of trials that fired.
+        forces: N, of trials that have a rate.
         rates: Hz.
 
     Raises:
@@ -76,7 +76,7 @@ def slopes(forces: Sequence[float], rates: Sequence[float]) -> FloatArray:
     force, which = np.unique(np.asarray(forces, float), return_inverse=True)
     if force.size < 2:
         raise NotIdentifiableError(
-            f"{force.size or 'no'} force{'s' * (force.size > 1)} made it fire, 2 are "
+            f"{force.size or 'no'} force{'s' * (force.size > 1)} gave a rate, 2 are "
             "needed for a slope"
         )
     rate = np.bincount(which, np.asarray(rates, float)) / np.bincount(which)

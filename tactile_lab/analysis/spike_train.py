@@ -5,6 +5,7 @@ Times are seconds, rates hertz.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,6 +67,16 @@ class Response:
     adaptation_index: float | None
     intervals: int
     silent: float | None
+
+    @property
+    def rates(self) -> tuple[float, float]:
+        """Peak and final rate as a plot has them, Hz: a silent hold has 0.
+
+        One spike has no rate: NaN.
+        """
+        unknown = 0.0 if self.spikes == self.ramp_spikes else math.nan
+        peak, final = self.peak_rate, self.final_rate
+        return unknown if peak is None else peak, unknown if final is None else final
 
     @property
     def counted(self) -> Response:

@@ -70,6 +70,15 @@ def test_a_force_that_comes_again_is_joined_by_no_line_of_the_model() -> None:
         assert rate_plot([SLOW, FAST], model).panels[0].series[-1].mark == mark
 
 
+def test_a_step_of_one_spike_has_no_rate_and_is_not_drawn_as_silent() -> None:
+    """It stood at 0 Hz, as the one that did not fire; the slope said it had not."""
+    once = replace(SLOW, level=0.06, spike_times=np.array([0.5]))
+    peak, final = rate_plot([SILENT, once, FAST]).panels[0].series
+    for series in (peak, final):
+        assert series.y[0] == 0.0 and np.isnan(series.y[1]) and series.y[2] > 0
+    assert rate_plot([SILENT, once]) is None
+
+
 def test_a_page_of_results_asks_for_no_more_height_than_it_needs(results) -> None:
     """Plots asked for a picture's, and the room became a gap above the last lines."""
     results.show_statements(["The rate rises."])
