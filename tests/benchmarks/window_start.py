@@ -30,9 +30,12 @@ def lived():
     return up - int(ticks) / os.sysconf("SC_CLK_TCK")
 
 def used(pid):
-    times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    below = [int(one) for task in Path(f"/proc/{pid}/task").iterdir()
-             for one in (task / "children").read_text().split()]
+    try:
+        times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        below = [int(one) for task in Path(f"/proc/{pid}/task").iterdir()
+                 for one in (task / "children").read_text().split()]
+    except FileNotFoundError:  # it ended just now
+        return 0.0
     own = sum(map(int, times[11:13])) / os.sysconf("SC_CLK_TCK")
     return own + sum(map(used, below))
 
