@@ -109,7 +109,9 @@ def release(port: serial.Serial, *, unsent: bool = False) -> None:
 
 def _told(port: str, what: str, reason: Exception) -> InstrumentError:
     number = getattr(reason, "errno", None)
-    start = f"The {what} at {port} cannot be opened ({reason})."
+    # with a number pyserial tells port and reason twice
+    why = str(reason) if number is None else os.strerror(number)
+    start = f"The {what} at {port} cannot be opened ({why})."
     if number in (errno.EAGAIN, errno.EBUSY):
         return InstrumentError(f"{start} Another program holds the port; close it.")
     if number in (errno.EACCES, errno.EPERM):

@@ -40,6 +40,7 @@ def test_each_instrument_is_recognised(served):
 def test_a_port_that_is_not_there():
     (found,) = attached(ports=["/dev/ttyUSB77"])
     assert found["identity"] is None and "plugged in" in found["problem"]
+    assert "cannot be opened (No such file or directory)." in found["problem"]
 
 
 def test_silence_is_told(served):
