@@ -92,6 +92,11 @@ class RunSource(Source):
         return bool(set(self.signals) - BENCH_ONLY - {"force"})
 
     @property
+    def sampled(self) -> bool:
+        """Whether samples were to be stored: a run may do without a scope."""
+        return bool(self._pyramids)
+
+    @property
     def loop(self) -> FloatArray:
         """Shape (n, 2): coil current, A, and the field read then, T; on steps only."""
         (at, force), (time, field) = self._slow["force"], self._slow["field"]

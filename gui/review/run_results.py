@@ -93,7 +93,7 @@ class RunResults(QObject):
         facts = [
             f"<b>{done.folder.name}</b>",
             done.off.text.partition(" | ")[0],
-            loss_text({**done.loss, "produced": 0} if bare else done.loss),
+            "" if bare else loss_text(done.loss),
         ]
         self._view.show_facts("<br>".join(filter(None, facts)), report=False)
 

@@ -88,9 +88,10 @@ def facts_of(source: RunSource) -> str:
         f"<b>{source.path.name}</b> · {sim}",
         html.escape(str(info.get("reason") or "")),
         str(info.get("coil") or "").partition(" | ")[0],
-        f"{show(float(info.get('sample_rate_Hz') or 0), 'S/s')} per channel.",
     ]
-    facts.append(loss_text(loss))
+    if source.sampled:
+        rate = float(info.get("sample_rate_Hz") or 0)
+        facts += [f"{show(rate, 'S/s')} per channel.", loss_text(loss)]
     return "<br>".join(fact for fact in facts if fact)
 
 

@@ -44,6 +44,7 @@ class Certificate:
             have noticed by its clock, s; None where it said nothing of that.
         missing: samples are missing, as the run found out, and how many is not known.
         searched: whether spikes were looked for while the run went on.
+        asked: whether samples were to be stored.
     """
 
     produced: int | None
@@ -57,6 +58,7 @@ class Certificate:
     seen_from: float | None = None
     missing: bool = False
     searched: bool = True
+    asked: bool = True
 
     @property
     def samples(self) -> int | None:
@@ -79,7 +81,8 @@ class Certificate:
         else:
             samples = f"{self.samples:,} of {self.produced:,} samples"
             if self.produced == 0:
-                samples = "no samples were kept"
+                kept = "kept" if self.asked else "asked for"
+                samples = f"no samples were {kept}"
             if self.seen_from is not None and self.covered is None:
                 samples += f" (gaps of {show(self.seen_from, 's')} or more are seen)"
         if self.covered is not None and self.streamed is not None:
@@ -145,6 +148,7 @@ def certify(run: Run) -> Certificate:
         spikes=None if offline is None else unmatched(online, offline).size,
         missing=bool(run.info.get("samples_missing")),
         searched=run.detection is not None,
+        asked=bool(run.signals),
     )
 
 

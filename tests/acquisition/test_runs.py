@@ -116,7 +116,7 @@ def test_V_K_is_acquired_for_spikes_even_where_it_is_not_stored(run_scene, short
     with ran.stored() as run:
         assert run.signals == ()
         assert run.spikes.size == ran.done.spikes
-        assert str(certify(run)).startswith("loss: no samples were kept")
+        assert str(certify(run)).startswith("loss: no samples were asked for")
 
 
 def test_V_C1_alone_searches_no_spikes_and_opens_one_channel(run_scene, short):

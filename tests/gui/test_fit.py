@@ -146,7 +146,9 @@ def test_bars_are_named_as_the_lanes_are(lab) -> None:
 
 def test_a_stored_run_that_ended_early_says_why():
     info = {"reason": "OSError: <usb> gone", "coil": "Output off, 0 A read back."}
-    source = SimpleNamespace(path=Path("runs/one"), simulated=False, info=info)
+    source = SimpleNamespace(
+        path=Path("runs/one"), simulated=False, info=info, sampled=True
+    )
     assert "<br>OSError: &lt;usb&gt; gone<br>Output off" in facts_of(source)
     assert "None" not in facts_of(SimpleNamespace(**{**vars(source), "info": {}}))
 

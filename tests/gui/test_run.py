@@ -1,5 +1,6 @@
 """A run from start to end, as the window shows and stops it."""
 
+import json
 import threading
 from dataclasses import replace
 
@@ -14,6 +15,7 @@ from gui.dialogs.help import Help
 from gui.lanes.expected import Preview, Stretch
 from gui.lanes.live import LiveSource
 from gui.lanes.source import PlanSource
+from gui.session.steps import facts_of
 from gui.state import CoilKnowledge, WindowState, stop_text, truth
 from sim_backend.serial_line import wires as serial_wires
 from sim_backend.serial_line.faults import SerialFault
@@ -101,7 +103,10 @@ def test_a_run_of_the_force_alone_claims_nothing_of_the_sensor(lab) -> None:
     stored = [line.text for line in session.log.lines if line.source == "store"]
     assert stored[-1].endswith("complete: spikes not looked for")
     results = window.review.results
-    assert "0 samples" not in results._facts_text.text()
+    for said in results._facts_text.text(), facts_of(window.screen_.run):
+        assert "samples" not in said and "S/s" not in said, "none were asked for"
+    lost = json.loads((folder / "run.json").read_text())["loss"]["text"]
+    assert lost.startswith("loss: no samples were asked for, ")
     assert results.plot.isVisibleTo(results)
     assert results.plot.nothing.startswith("Spikes are not looked for")
 
