@@ -70,6 +70,11 @@ NO_SPIKES = (
     "Spikes are not looked for in this run: what it\n"
     "gives is told by the report, at its end."
 )
+SEVERAL = (
+    "Results are of one run: choose it in Runs.\n"
+    "Those of several, side by side, are written\n"
+    "by tactile-lab report RUN RUN."
+)
 
 HEADINGS = ("Step", "Spikes", "First\nms", "Peak\nHz", "Final\nHz", "Fall\n%")
 
@@ -99,7 +104,7 @@ class ResultsView(QWidget):
         self._told: list[tuple[str, ...]] = []
         self._model: tuple[tuple[float, float], ...] = ()
         self._laws: tuple[FittedRate, ...] = ()
-        self._fires, self._loops = True, False
+        self._fires, self._loops, self._several = True, False, False
         self.drawn, self.against = Combo(), Combo()
         self.drawn.addItems(["rates", *COLUMNS])
         self.against.addItems(list(COLUMNS))
@@ -170,9 +175,12 @@ class ResultsView(QWidget):
         self._show_rates()
         self._arrange()
 
-    def show_kind(self, *, fires: bool) -> None:
-        """Say whether spikes are looked for: without them there are no rates."""
-        self._fires, self._loops = fires, False
+    def show_kind(self, *, fires: bool, several: bool = False) -> None:
+        """Say whether spikes are looked for: without them there are no rates.
+
+        Of several runs that are compared nothing is told here.
+        """
+        self._fires, self._loops, self._several = fires, False, several
         self._show_rates()
         self._arrange()
 
@@ -214,6 +222,8 @@ class ResultsView(QWidget):
     @property
     def _nothing(self) -> str:
         """What is said where no rates can be drawn."""
+        if self._several:
+            return SEVERAL
         if not self._fires:
             return NO_SPIKES
         if self._levelled:

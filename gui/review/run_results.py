@@ -69,8 +69,13 @@ class RunResults(QObject):
         self._view.show_kind(fires=fires)
 
     def clear(self) -> None:
-        """Of what is on screen there is nothing to tell: it is no run, or several."""
+        """Of what is on screen there is nothing to tell: it is no run."""
         self._empty(0, fires=True, running=False)
+
+    def compare(self) -> None:
+        """Several runs are on screen: what each gave is told when it is alone."""
+        self.clear()
+        self._view.show_kind(fires=False, several=True)
 
     def step(self, outcome: Outcome, source: LiveSource | None) -> None:
         """A step has ended."""

@@ -374,7 +374,7 @@ class Screen(QObject):
         self._panels.session.opened = names
         paths = [one.source.path for one in comparison.members]
         self._panels.review.runs.show_current(*filter(None, paths))
-        self.results.clear()
+        self.results.compare()
         self._panels.centre.compare_bar.show_comparison(comparison)
         self._panels.centre.show_source(comparison, self._lanes())
         self._show_steps(comparison.first, f"Steps of {MARKS[0]} {names[0]}")

@@ -217,6 +217,8 @@ def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     assert "residual" not in keys, "the model is not compared"
     results = window.screen_.results
     assert results.steps == [] and results.folder is None, "they are of one run"
+    view = window.review.results
+    assert view.plot.isVisibleTo(view) and "of one run" in view.plot.nothing
     window.centre.compare_bar.align.group.button(1).click()
     starts = [m.source.holds[0].start + m.shift for m in comparison.members]
     assert abs(starts[0] - starts[1]) < 1e-9
