@@ -462,7 +462,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         painter, frame, source, tokens = on.painter, on.frame, on.source, on.tokens
         if not self.lane.valued:
             return
-        edge = source.right_edge(self._stage.view)
+        edge = source.right_edge(self._stage.view, self.lane)
         widest = COARSE if source.running else FINE
         value = values_at(self.lane, source, edge, self.painted, widest)[0]
         if value is None or edge < frame.start:

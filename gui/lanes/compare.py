@@ -151,7 +151,7 @@ class Comparison(Source):
             return [one.minus(found[0], grid) for one in found]
         return found
 
-    def right_edge(self, view: TimeView) -> float:
+    def right_edge(self, view: TimeView, lane: Lane) -> float:
         """Where runs are read on the right: all at once, where all are seen to go on.
 
         Runs of the same length end a little apart, when shifted.

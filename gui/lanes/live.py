@@ -83,10 +83,15 @@ class LiveSource(Source):
 
     @property
     def reach(self) -> float:
-        """Time up to which there is data, s."""
-        if self._pyramids:
+        """Time up to which there is data, s; of a scope's while the run goes on."""
+        if self._pyramids and self.running:
             return self._streamed
-        return max(readings.end for readings in self._slow.values())
+        return max(self._streamed, *(one.end for one in self._slow.values()))
+
+    @property
+    def sampled_until(self) -> float:
+        """Time up to which samples have come, s."""
+        return self._streamed if self._pyramids else self.reach
 
     @property
     def length(self) -> float:

@@ -55,7 +55,7 @@ class LaneRow:
         edge of the view, as the tag has it, and of spikes how many are in view.
         """
         lane, card, view = self.lane, self.card, self._stage.view
-        edge = source.right_edge(view)
+        edge = source.right_edge(view, lane)
         if len(source.members) > 1:
             self._show_runs(source, edge)
         elif lane.raster:

@@ -157,9 +157,20 @@ class Source:
         """Whether the first member is taken from all in a lane."""
         return False
 
-    def right_edge(self, view: TimeView) -> float:
-        """The time that is read on the right: the view's end, or where data end, s."""
-        return min(view.end, self.reach)
+    @property
+    def sampled_until(self) -> float:
+        """Time up to which there are samples; all there is where there are none, s."""
+        return self.reach
+
+    def right_edge(self, view: TimeView, lane: Lane) -> float:
+        """Where a lane is read on the right: at the view's end, or that of data, s.
+
+        What is measured is read where samples end, if that is in view: a coil may be
+        late to go to 0 A. The force goes on: it is heard of when a scope no longer is.
+        """
+        edge, end = min(view.end, self.reach), self.sampled_until
+        measured = lane.key != "force" and view.start < end < edge
+        return end if measured else edge
 
 
 @dataclass(frozen=True, eq=False)

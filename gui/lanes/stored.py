@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,9 +24,6 @@ from tactile_lab.store.signal import StoredSignal
 from tactile_lab.store.spike_shapes import threshold_of
 from tactile_lab.store.stored_run import Records
 from tactile_lab.trace import Trace
-
-if TYPE_CHECKING:
-    from gui.lanes.view import TimeView
 
 FINER = 2
 """Cells a pixel that are read."""
@@ -168,12 +165,10 @@ class RunSource(Source):
             self._fetch(signal, (start, end, count))
         return pyramid.between(start, end, count)
 
-    def right_edge(self, view: TimeView) -> float:
-        """Where samples end, if that is in view: a coil may be late to go to 0 A."""
-        edge = super().right_edge(view)
-        ends = [one.end for one in self._pyramids.values()]
-        end = min(ends, default=edge)
-        return end if view.start < end < edge else edge
+    @property
+    def sampled_until(self) -> float:
+        """Where the first of the signals ends."""
+        return min((one.end for one in self._pyramids.values()), default=self.reach)
 
     def take_fetched(self) -> bool:
         """Whether samples have arrived since this was last asked."""

@@ -142,7 +142,7 @@ class Fit:
 
 def fit_input(source: Source) -> FitInput:
     """What `fit` compares; cheap, and called where the source may be read."""
-    reach = source.reach
+    reach = source.sampled_until
     twin = source.twin_spikes
     return FitInput(
         source.spikes.copy(),

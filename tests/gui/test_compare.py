@@ -111,11 +111,13 @@ def test_runs_are_read_where_the_first_of_them_ends(comparison: Comparison) -> N
     view = TimeView()
     view.set_now(comparison.reach, comparison.length)
     view.show_span(0.0, 10.0)
-    assert comparison.right_edge(view) == 9.7
+    assert comparison.right_edge(view, LANES["V_C1"]) == 9.7
     view.show_span(0.0, 5.0)
-    assert comparison.right_edge(view) == 5.0
+    assert comparison.right_edge(view, LANES["V_C1"]) == 5.0
     view.show_span(9.8, 0.2)
-    assert comparison.right_edge(view) == 10.0, "others are not seen to end"
+    assert comparison.right_edge(view, LANES["V_C1"]) == 10.0, (
+        "others are not seen to end"
+    )
 
 
 def test_values_are_read_on_the_common_time(comparison: Comparison) -> None:

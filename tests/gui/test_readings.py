@@ -136,9 +136,28 @@ def test_a_run_seen_whole_has_values_though_its_record_ends_before_it(ends, told
         flat = np.full(time.size, 1.25, np.float32)
         source.add_bins({signal: Trace.bins(time, flat, flat, flat, 1e-3)})
     whole = source.shown(lane, 0.0, 60.0, 800)
-    edge = source.right_edge(_seen(60.0))
+    edge = source.right_edge(_seen(60.0), lane)
     found = values_at(lane, source, edge, Painted(0.0, 60.0, tuple(whole)))
     assert found == ((1.25,) if told else (None,))
+
+
+def test_force_is_read_where_its_lane_ends_though_the_scope_was_unplugged() -> None:
+    """It said 120.0 mN beside a line that had fallen to 0."""
+    source = LiveSource(None, 0.12)
+    flat = np.full(3000, 1.25)
+    bins = Trace.bins(np.arange(3000) * 1e-3, flat, flat, flat, 1e-3)
+    source.add_bins({"V_C1": bins})
+    for time, current in ((0.0, 1.0), (3.4, 0.0)):
+        source.add_current(time, current)
+    assert _right(source, "force") == 0.12e3, "the run goes on: it is behind the coil"
+    source.running = False
+    assert (_right(source, "force"), _right(source, "V_C1")) == (0.0, 1.25)
+
+
+def _right(source: LiveSource, key: str) -> float | None:
+    lane = LANES[key]
+    edge = source.right_edge(_seen(10.0), lane)
+    return values_at(lane, source, edge, Painted())[0]
 
 
 def _seen(width: float) -> TimeView:

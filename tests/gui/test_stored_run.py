@@ -9,6 +9,7 @@ from PySide6.QtSvg import QSvgRenderer
 from gui.dialogs.saving import table, write_scene, write_view
 from gui.session.steps import of_run
 from tactile_lab.report.from_run import read
+from tactile_lab.trace import Trace
 
 
 def test_old_run_opens_in_the_same_lanes(lab) -> None:
@@ -78,7 +79,10 @@ def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
     view.show_all()
     lab.until(lambda: says("spikes") == "4" and says("force") == "0.0")
     known = says("V_C1")
+    lab.until(lambda: stack.row("residual"))  # the model comes when it is computed
     run.reach = run.length = run.reach + 0.3  # its coil was late to go to 0 A
+    late = np.array([0.0, run.reach - 0.1])
+    run._lines["force"] = Trace.steps(late, np.array([0.12, 0.0]), run.reach)
     stack.show_source(run)
     view.set_now(run.reach, run.length)
     view.show_all()
@@ -87,6 +91,7 @@ def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
     for key in ("V_C2", "V_K", "residual"):
         assert says(key) != "—", "all that was measured has a last value"
     assert says("V_C1") == known
+    assert says("force") == "0.0", "where its own lane ends"
 
 
 def test_dropped_scene_is_loaded_and_dropped_run_is_opened(lab) -> None:
