@@ -42,13 +42,11 @@ class Arrangement:
         rest = [key for key in self._order if key not in keys]
         self._order = [*keys, *rest]
 
-    def resize(self, upper: Lane, lower: Lane, heights: tuple[float, float]) -> None:
-        """Share the height of two neighbours as these heights, px, are."""
-        both = self.weight(upper) + self.weight(lower)
-        total = sum(heights)
-        high = min(max(heights[0], LOWEST), max(total - LOWEST, LOWEST))
-        self._weights[upper.key] = both * high / total
-        self._weights[lower.key] = both * (1 - high / total)
+    def resize(self, lanes: Sequence[Lane], heights: Sequence[float]) -> None:
+        """Share the height of lanes as these heights, px, are."""
+        share = sum(self.weight(lane) for lane in lanes) / sum(heights)
+        for lane, height in zip(lanes, heights, strict=True):
+            self._weights[lane.key] = share * height
 
     @property
     def text(self) -> str:
@@ -65,3 +63,23 @@ class Arrangement:
             return  # of another version: the lanes are as they are by themselves
         if all(0.01 < share < 100 for share in found.values()):
             (self._order, self.hidden), self._weights = keys, found
+
+
+def resized(heights: Sequence[float], at: int, by: float) -> list[float]:
+    """Heights, px, once one is higher by so many px, at the cost of those below it.
+
+    The next below gives first, then the one below that: at its least it has nothing to
+    give. What the lane itself gives, where `by` is negative, goes to the next below.
+    """
+    found = list(heights)
+    if by < 0:
+        givers, taker = range(at, at + 1), at + 1
+    else:
+        givers, taker = range(at + 1, len(found)), at
+    wanted = abs(by)
+    for giver in givers:
+        given = min(wanted, max(found[giver] - LOWEST, 0.0))
+        found[giver] -= given
+        found[taker] += given
+        wanted -= given
+    return found

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QPoint, QPointF, Qt, Signal
 from PySide6.QtWidgets import QFrame, QMenu
 
-from gui.lanes.arrangement import Arrangement
+from gui.lanes.arrangement import Arrangement, resized
 from gui.lanes.box import LaneBox
 from gui.lanes.card import LaneAct
 from gui.lanes.floor import LaneContext
@@ -152,13 +152,12 @@ class LaneStack(QFrame):
         self.arrange()
 
     def _resize(self, which: LaneRow, by: float) -> None:
-        """Make a lane higher by so many px, at the cost of the next below."""
+        """Make a lane higher by so many px, at the cost of those below."""
         shown = self.visible_rows()
         at = shown.index(which)
         if at + 1 < len(shown):
-            below = shown[at + 1]
-            heights = which.card.height() + by, below.card.height() - by
-            self.arrangement.resize(which.lane, below.lane, heights)
+            heights = resized([one.card.height() for one in shown], at, by)
+            self.arrangement.resize([one.lane for one in shown], heights)
             self.arrange()
             self._whole.activate()  # the next move of the pointer goes on from there
 

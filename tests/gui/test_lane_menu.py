@@ -102,6 +102,19 @@ def test_lanes_are_moved_and_resized_by_drag_and_stay_so(app, stack):
     other.close()
 
 
+def test_a_lane_grows_where_the_next_below_is_at_its_least(app, stack):
+    """On a small screen the edge above a low lane could be dragged and did nothing."""
+    settle(app)
+    before, by = box(stack, "V_C1").height(), box(stack, "V_K").height()
+    card = stack.row("V_C1").card
+    drag_card(card, card.height() - 2, by)
+    settle(app)
+    assert box(stack, "V_C1").height() == pytest.approx(before + by, abs=4)
+    drag_card(card, card.height() - 2, -by)
+    settle(app)
+    assert box(stack, "V_C1").height() == pytest.approx(before, abs=4)
+
+
 @pytest.mark.parametrize("text", ["", "no JSON", "{}", '[[], {"V_K": -1}, []]'])
 def test_an_arrangement_that_cannot_be_read_changes_nothing(text):
     lanes = lanes_for(("force", "V_C1", "V_K"), twin=False)
