@@ -144,7 +144,8 @@ class RunActions(QObject):
             self._screen.open_run(folder)
 
     def _said(self, folder: Path) -> None:
-        """Somebody said something of a run: list and lanes show it."""
+        """Somebody said something of a run: list, lanes and report show it."""
+        self._panels.session.run.renew_report(folder)
         self._screen.list_runs()
         run = self._screen.run
         if run is not None and run.path == folder:

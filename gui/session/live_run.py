@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -56,6 +57,7 @@ class LiveRun(LiveTask):
         out: folder for run folders.
         waiting: notes that were typed before the next run; it will have them.
         reports: whether the report is written at its end.
+        reporting: folders whose report is being written.
         publish: whether the next runs are published by Lab Streaming Layer.
     """
 
@@ -87,6 +89,8 @@ class LiveRun(LiveTask):
         self.notes: dict[str, str] = {}
         self.waiting: list[str] = []
         self.reports = True
+        self.reporting: set[Path] = set()
+        self._outdated: set[Path] = set()
         self.publish = False
 
     def start(
@@ -231,15 +235,43 @@ class LiveRun(LiveTask):
             follow: then do what the lab has follow each run.
         """
 
-        def told(reply: Reply[None]) -> None:
-            self._report(folder, reply)
+        def written() -> None:
+            self.reported.emit(folder)
             if follow:
                 self._follow(folder)
 
         if self.reports:
-            self._link.ask(told, write_report, folder)
+            self._write_report(folder, written)
         elif follow:
             self._follow(folder)
+
+    def renew_report(self, folder: Path) -> None:
+        """Have a report that is there written again: more was said of its run.
+
+        What it concludes is the same, and is not told again.
+        """
+        if folder in self.reporting:
+            self._outdated.add(folder)
+        elif (folder / "report.html").exists():
+            self._write_report(folder, lambda: None)
+
+    def _write_report(self, folder: Path, then: Callable[[], None]) -> None:
+        """Have a report written; again, if it was outdated meanwhile."""
+
+        def told(reply: Reply[None]) -> None:
+            self.reporting.discard(folder)
+            if reply.problem:
+                self._log.add(Severity.WARNING, "report", reply.problem)
+            else:
+                words = f"Report in {folder / 'report.html'}"
+                self._log.add(Severity.GOOD, "report", words)
+            then()
+            if folder in self._outdated:
+                self._outdated.discard(folder)
+                self.renew_report(folder)
+
+        self.reporting.add(folder)
+        self._link.ask(told, write_report, folder)
 
     def _follow(self, folder: Path) -> None:
         """Have what the lab wants done after a run done."""
@@ -282,11 +314,3 @@ class LiveRun(LiveTask):
                 self._status.enter(WindowState.ABORTING)
         if event.state in (events.RunState.CONNECTING, events.RunState.RUNNING):
             self._log.add(Severity.INFO, "runner", event.text.capitalize())
-
-    def _report(self, folder: Path, reply: Reply[None]) -> None:
-        if reply.problem:
-            self._log.add(Severity.WARNING, "report", reply.problem)
-        else:
-            words = f"Report in {folder / 'report.html'}"
-            self._log.add(Severity.GOOD, "report", words)
-        self.reported.emit(folder)

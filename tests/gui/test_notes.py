@@ -77,6 +77,26 @@ def test_a_note_beside_an_old_run_is_kept_with_that_run(lab) -> None:
     entries.search.clear()
 
 
+def test_a_report_is_written_again_for_what_is_noted_after_it(lab) -> None:
+    window, folder = lab.window, lab.folder / "noted"
+    shutil.copytree(lab.runs(1)[0], folder)
+    report = folder / "report.html"
+    window.screen_.open_run(folder)
+    lab.until(lambda: lab.session.opened == (folder.name,))
+    type_note(lab, "before any report")
+    assert not lab.session.run.reporting, "none is wanted"
+    report.write_text("written at the end of the run")
+    told: list[object] = []
+    lab.session.run.reported.connect(told.append)
+    type_note(lab, "drifted a little")
+    type_note(lab, "while it is written")
+    lab.until(lambda: not lab.session.run.reporting)
+    for said in "drifted a little", "while it is written":
+        assert said in report.read_text()
+    lab.session.run.reported.disconnect(told.append)
+    assert not told, "a check that is judged now is none of an old run's report"
+
+
 def test_name_tags_and_notes_are_edited_on_the_card(lab) -> None:
     window, folder = lab.window, lab.runs(1)[0]
     card = window.runs.card
