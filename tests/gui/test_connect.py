@@ -375,6 +375,7 @@ def test_a_card_that_closes_gives_the_keyboard_back_to_the_window(lab) -> None:
     window = lab.window
     window.activateWindow()
     lab.until(window.isActiveWindow)
+    window.page.setFocus()  # another test may have left it in a lane
     window.actions_.connect_dialog()
     dialog = window.findChild(Connect)
     assert lab.app.focusWidget() is dialog.instruments.scan
