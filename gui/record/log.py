@@ -110,8 +110,8 @@ class LogView(QWidget):
     """The log with its filters and the field for notes."""
 
     noted = Signal(str)
-    step_chosen = Signal(float)
-    """A line that tells of a time of the run was double clicked; that time, s."""
+    step_chosen = Signal(float, object)
+    """A line that tells of a time of a run was double clicked; time, s, and folder."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -149,9 +149,9 @@ class LogView(QWidget):
         self.table.scrollToBottom()
 
     def _activated(self, index: Index) -> None:
-        time = self.model.lines[self.filter.mapToSource(index).row()].time
-        if time is not None:
-            self.step_chosen.emit(time)
+        line = self.model.lines[self.filter.mapToSource(index).row()]
+        if line.time is not None:
+            self.step_chosen.emit(line.time, line.run)
 
     def _noted(self) -> None:
         text = self.note.text().strip()

@@ -249,8 +249,12 @@ class Centre(QWidget):
         self.stack.refresh()
         self.stack.show_values()
 
-    def _show_step(self, time: float) -> None:
-        """Show the step that a time of the run is in, or that time itself."""
+    def _show_step(self, time: float, run: Path | None) -> None:
+        """Show the step that a time of a run is in, or that time itself."""
+        shown = self.stack.source.members[0].source.path
+        if run is not None and shown is not None and shown != run:
+            self.say(f"{run.name} is not on screen; open it in Runs.")
+            return
         for one in reversed(self.stack.source.holds):
             if one.start - LATER <= time < one.end:
                 self.view.show_step(one.start, one.end - one.start)

@@ -303,7 +303,7 @@ class LiveRun(LiveTask):
         source.begin_trial(event.index, Stretch.of(trial, start))
         what = "recovery" if trial.pause else trial.label
         words = f"Step {event.index + 1} · {what} started"
-        self._log.add(Severity.INFO, "runner", words, time=start)
+        self._log.add(Severity.INFO, "runner", words, time=start, run=self.folder)
         self._status.changed.emit()
 
     def _run_state(self, event: events.StateChanged) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
+from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
@@ -33,6 +34,7 @@ class LogLine:
         text: for a person.
         safety: whether it is about the coil's safe state.
         time: of the run it tells of, s; None where it tells of none.
+        run: folder of that run; None where it is not kept.
     """
 
     at: datetime
@@ -41,6 +43,7 @@ class LogLine:
     text: str
     safety: bool = False
     time: float | None = None
+    run: Path | None = None
 
 
 class Log(QObject):
@@ -60,10 +63,11 @@ class Log(QObject):
         *,
         safety: bool = False,
         time: float | None = None,
+        run: Path | None = None,
     ) -> None:
         """Put a line into the log; `time`: of the run, s, where it has one."""
         text = text.replace("`", "")  # which mark commands in a terminal
-        line = LogLine(datetime.now(), level, source, text, safety, time)
+        line = LogLine(datetime.now(), level, source, text, safety, time, run)
         self.lines.append(line)
         del self.lines[:-KEPT]
         self.added.emit(line)

@@ -1,5 +1,7 @@
 """A click on a step goes there: in the bar, in the table, in the log."""
 
+import shutil
+
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
@@ -63,8 +65,17 @@ def test_a_line_of_the_log_on_a_step_shows_it(lab) -> None:
         for row, line in enumerate(log.model.lines)
         if line.source == "runner" and "120 mN started" in line.text
     ]
-    log.table.activated.emit(log.filter.mapFromSource(log.model.index(rows[-1], 3)))
+    line = log.filter.mapFromSource(log.model.index(rows[-1], 3))
+    log.table.activated.emit(line)
     assert shows(view, steps[1])
+    other = shutil.copytree(folder, folder.with_name("another"))
+    window.screen_.open_run(other)
+    lab.until(lambda: getattr(window.screen_.run, "path", None) == other)
+    view.show_all()
+    seen = view.start, view.end
+    log.table.activated.emit(line)
+    assert (view.start, view.end) == seen, "the step of another run"
+    assert folder.name in window.centre.notice.text()
 
 
 def test_a_run_that_ended_tells_the_times_of_its_record(lab) -> None:
