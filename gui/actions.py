@@ -404,7 +404,7 @@ class Actions(QObject):
         }
         recent = self.preferences.recent
         menu = GearMenu(self.window, self.panels, self.screen, recent, acts)
-        menu.open_below(self.panels.header.menu_button)
+        menu.open_below(self.panels.header)
 
     def copy_command(self) -> None:
         """Put the command that runs what the form asks for on the clipboard."""

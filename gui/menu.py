@@ -9,6 +9,7 @@ from pathlib import Path
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QMenu, QWidget
 
+from gui.header.header import Header
 from gui.review.run_card import day
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
@@ -81,9 +82,10 @@ class GearMenu(QMenu):
         self._add("About Tactile Lab")
         self._add("Quit", "Ctrl+Q")
 
-    def open_below(self, button: QWidget) -> None:
-        """Open it below its button."""
-        self.popup(button.mapToGlobal(QPoint(0, button.height())))
+    def open_below(self, header: Header) -> None:
+        """Open it at its button, below all of the header: STOP stays whole."""
+        left = header.menu_button.mapTo(header, QPoint()).x()
+        self.popup(header.mapToGlobal(QPoint(left, header.height())))
 
     def _add(self, words: str, keys: str = "") -> None:
         # a tab parts the keys; the window has the shortcuts, the menu only names them

@@ -56,6 +56,16 @@ def test_settings_act_at_once(lab) -> None:
     assert session.out == out
 
 
+def test_the_menu_leaves_stop_uncovered(lab) -> None:
+    """It lay over the lower edge of STOP."""
+    lab.window.actions_.show_menu()
+    menu = lab.window.findChild(GearMenu)
+    stop = lab.window.header.stop
+    assert menu.isVisible()
+    assert menu.geometry().top() > stop.mapToGlobal(stop.rect().bottomLeft()).y()
+    menu.close()
+
+
 def test_a_folder_that_the_command_line_names_wins(lab, kept: QSettings) -> None:
     """Save moved the runs of a window that was started with --out."""
     window, session = lab.window, lab.session
