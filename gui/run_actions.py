@@ -125,6 +125,7 @@ class RunActions(QObject):
         elif QFile.moveToTrash(str(folder)):
             said = f"{folder.name} is in the waste basket"
             self._panels.session.log.add(Severity.INFO, "store", said)
+            self._panels.centre.say("")  # of a run that could not be deleted
         else:
             self._screen.say(
                 f"{folder} was not deleted: the desktop offers no waste basket for it. "

@@ -41,7 +41,7 @@ from tactile_lab.notebook import facts
 from tactile_lab.quantity import exact, parse
 from tactile_lab.scene.load import load
 from tactile_lab.store.folder import LOG, is_live, read_info
-from tactile_lab.store.remarks import Note, read_remarks, write_remarks
+from tactile_lab.store.remarks import Note, Remarks, read_remarks, write_remarks
 from tactile_lab.table import dumped, fields_of
 
 PAGES = ("Notes", "Facts", "Settings", "Log")
@@ -57,6 +57,8 @@ class AboutRun(Overlay):
     def __init__(self, window: QWidget, theme: Theme) -> None:
         super().__init__(window, 760)
         self._folder = Path()
+        self._as_read: Remarks | None = None
+        self._shown: tuple[object, ...] = ()
         self.heading = Elided("", "muted")
         self.title = line_edit("Name of the run", "its protocol's name")
         self.star = IconButton(theme, "star", "It matters", checkable=True)
@@ -94,11 +96,11 @@ class AboutRun(Overlay):
         self._read.connect(self._show_read)
 
     def show_run(self, folder: Path) -> None:
-        """Open the card for a run."""
+        """Open the card for a run, with what was typed of it and not saved."""
+        left = folder == self._folder and self._typed() != self._shown
         self._folder = folder
         self.heading.set_whole(str(folder))
         say(self.problem, "")
-        self.notes.setRowCount(0)
         for text in self.texts.values():
             text.setPlainText("reading …")
         try:
@@ -108,17 +110,34 @@ class AboutRun(Overlay):
             say(self.problem, str(error))
             self.save.setEnabled(False)
         else:
-            self.title.setText(said.title)
-            self.tags.setText(", ".join(said.tags))
-            self.star.setChecked(said.starred)
-            for note in said.notes:
-                self._add_row(note)
+            if left and said == self._as_read:
+                say(self.problem, "Not saved yet: Save keeps what was typed here.")
+            else:
+                self._fill(said)
             self.save.setEnabled(not live)
             self.save.setToolTip("Once the run has ended" if live else "")
         self.show_page(0)
         self.open()
         self.title.setFocus()
         start(lambda: self._look(folder), "about run", finishes=True)
+
+    def _fill(self, said: Remarks) -> None:
+        self.title.setText(said.title)
+        self.tags.setText(", ".join(said.tags))
+        self.star.setChecked(said.starred)
+        self.notes.setRowCount(0)
+        for note in said.notes:
+            self._add_row(note)
+        self._as_read, self._shown = said, self._typed()
+
+    def _typed(self) -> tuple[object, ...]:
+        """All that can be typed or chosen, as it stands there."""
+        cells = [
+            "" if (item := self.notes.item(at, where)) is None else item.text()
+            for at in range(self.notes.rowCount())
+            for where in (0, 1)
+        ]
+        return self.title.text(), self.tags.text(), self.star.isChecked(), *cells
 
     def show_page(self, number: int) -> None:
         """0 Notes, 1 Facts, 2 Settings, 3 Log."""
@@ -157,6 +176,7 @@ class AboutRun(Overlay):
             say(self.problem, str(error))
             self.open()
             return
+        self._shown = self._typed()
         self.hide()
         self.saved.emit(self._folder)
 

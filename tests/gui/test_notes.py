@@ -2,12 +2,12 @@
 
 import shutil
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QFile, Qt
 from PySide6.QtTest import QTest
 
 from gui.dialogs.saving import picture
 from gui.state import WindowState
-from tactile_lab.store.remarks import read_remarks
+from tactile_lab.store.remarks import add_note, read_remarks
 from tactile_lab.store.run import Run
 
 
@@ -128,6 +128,26 @@ def test_a_time_that_is_none_is_refused_on_the_card(lab) -> None:
     card.save.click()
     assert card.isVisible() and "soon" in card.problem.text()
     card.hide()
+    card.show_run(folder)
+    assert card.notes.item(0, 0).text() == "soon", "it was dropped, and nobody told"
+    assert card.problem.text().startswith("Not saved yet")
+    add_note(folder, "by another hand")
+    card.show_run(folder)
+    assert card.notes.findItems("by another hand", Qt.MatchFlag.MatchExactly)
+    assert not card.problem.text()
+    card.hide()
+
+
+def test_a_run_in_the_waste_basket_takes_the_notice_of_another_away(
+    lab, monkeypatch
+) -> None:
+    runs, said = lab.window.runs, lab.window.centre.notice
+    kept, gone = lab.folder / "kept", lab.folder / "gone"
+    kept.mkdir(), gone.mkdir()
+    for folder, moved in (kept, False), (gone, True):
+        monkeypatch.setattr(QFile, "moveToTrash", lambda path, moved=moved: moved)
+        runs._delete(folder)
+        assert said.isHidden() is moved
 
 
 def test_a_run_that_was_cut_short_is_recovered_in_the_window(lab) -> None:
