@@ -113,6 +113,7 @@ from tactile_lab.model.taylor import (
     highest,
     longest,
     move,
+    rested,
     to_chebyshev,
 )
 from tactile_lab.model.taylor import V as OF_V_C2
@@ -200,13 +201,10 @@ def _build(stamp: int) -> Callable[..., Any]:
                 S[ROWS_0] += 1.0
             S[V_P] = V1
             S[V_P_HIGHEST] = max(S[V_P_HIGHEST], V1)
-            B0, B1 = B_at(V0, par), B_at(V1, par)
+            B0 = B_at(V0, par)
             y, v = S[Y], S[VOLTAGE]
-            y_a, y_b = equilibrium(B0, par), equilibrium(B1, par)
-            # leakage of T1 alone can pull node A down, by less than I_T1s
-            low = min(y, y_a, y_b, v) - 1e-3 * par[V_T]
+            low, above, bounded = min(y, v), 0.0, False
             high = max(y, par[V_S], v, par[V_RESET]) + par[V_T]
-            above = reach(low, max(B0, B1) + par[LAMBDA] * high, par)
             s = carry = 0.0
             if S[RESUME] == 0.0:
                 v = restart(B0, y, par, E, S, f, g)
@@ -216,6 +214,7 @@ def _build(stamp: int) -> Callable[..., Any]:
             flow(B0, y, v, held, par, f)
             moving = abs(f[TO_A]) > -1e-14 * f[A_BY_1] * high
             moving |= abs(f[TO_C2]) > -1e-14 * f[C2_BY_2] * high
+            at_rest = V1 == V0 and not (moving or held)
             stiff = V1 == V0 and not moving
             h = T
             known = False
@@ -245,7 +244,17 @@ def _build(stamp: int) -> Callable[..., Any]:
                     short = (
                         short + 1 if degree and step[UNITS] == longest(degree) else 0
                     )
-                if degree == 0:
+                if at_rest:
+                    h = room
+                    rested(h, y, v, f, a, b, step)
+                elif degree == 0:
+                    if not bounded:
+                        B1 = B_at(V1, par)
+                        low = min(low, equilibrium(B0, par), equilibrium(B1, par))
+                        # leakage of T1 alone can pull it down, by less than I_T1s
+                        low -= 1e-3 * par[V_T]
+                        above = reach(low, max(B0, B1) + par[LAMBDA] * high, par)
+                        bounded = True
                     if 1.0001 * h >= room:
                         h = room
                     elif 1.8 * h > room:
@@ -350,7 +359,10 @@ def _build(stamp: int) -> Callable[..., Any]:
                     f, g = g, f
                 if u <= 1.0:
                     B = B_at(V_P_at(s, V0, p, par[TAU]), par)
-                    flow(B, y, v, False, par, f)
+                    if degree:
+                        f, g = g, f
+                    else:
+                        flow(B, y, v, False, par, f)
                     flow(B, y, v, True, par, g)
                     # where it only grazes V_fire, the step is all that is known
                     slope = max(f[TO_C2], inside / h)

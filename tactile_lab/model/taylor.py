@@ -274,7 +274,11 @@ def moved(
     mean, half = 0.5 * (p + s), 0.5 * (p - s)
     square = half * half + q * r
     root = math.sqrt(abs(square))
-    if root < 1e-3:
+    if square > 0.0 and root > 300.0:
+        # the other eigenvalue has nothing left to say
+        even = 0.5 * math.exp(mean + root)
+        mean, odd = 0.0, even / root
+    elif root < 1e-3:
         even, odd = 1.0 + 0.5 * square, 1.0 + square / 6.0
     elif square > 0.0:
         up = math.exp(root)
@@ -284,6 +288,29 @@ def moved(
     scale = math.exp(mean)
     step[MOVED], step[MOVED + 1] = scale * (even + odd * half), scale * odd * q
     step[MOVED + 2], step[MOVED + 3] = scale * odd * r, scale * (even - odd * half)
+
+
+@inner
+def rested(
+    h: float, y: float, v: float, f: FloatArray, a: FloatArray, b: FloatArray,
+    step: FloatArray,
+) -> None:  # fmt: skip
+    """A step of h s on which both voltages stay where they are, to rounding.
+
+    It is wrong by how far the equilibrium is, which `flow` at the start tells.
+    """
+    for i in range(ORDER + 1):
+        a[i] = b[i] = 0.0
+    a[0], b[0] = y, v
+    step[Y_END], step[V_END] = y, v
+    moved(h, f, f, f, step)
+    # Cramer's rule
+    by_all = abs(f[A_BY_1] * f[C2_BY_2] - f[A_BY_2] * f[C2_BY_1])
+    one, two = abs(f[TO_A]), abs(f[TO_C2])
+    step[LEFT_1] = (one * abs(f[C2_BY_2]) + two * abs(f[A_BY_2])) / by_all
+    step[LEFT_2] = (one * abs(f[C2_BY_1]) + two * abs(f[A_BY_1])) / by_all
+    step[STAYS_1], step[STAYS_2] = step[LEFT_1], step[LEFT_2]
+    step[LENGTH], step[GROWTH], step[UNITS] = h, 1.0, 1e300
 
 
 @inner
