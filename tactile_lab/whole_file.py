@@ -44,7 +44,9 @@ def failing_as(
     except TactileLabError:
         raise
     except OSError as reason:
-        said = f"{what}: {reason.strerror or reason}. {advice}"
+        file = "" if reason.filename is None else str(reason.filename)
+        where = "" if file in what else f" ({file})"
+        said = f"{what}: {reason.strerror or reason}{where}. {advice}"
         raise kind(said.rstrip()) from reason
 
 
