@@ -120,11 +120,11 @@ def stored(
     for i in range(count):
         whole[i] = spikes[i]
     at = count
-    for rows, count in (
+    for rows, filled in (
         (segments, S[ROWS_0]), (steps, S[ROWS_1]), (pieces, S[ROWS_2])
     ):  # fmt: skip
-        more = int(count) * rows.shape[1]
-        whole[at : at + more] = rows[: int(count)].ravel()
+        more = int(filled) * rows.shape[1]
+        whole[at : at + more] = rows[: int(filled)].ravel()
         at += more
     return whole
 

@@ -17,6 +17,7 @@ from tactile_lab.store.index import Index
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.summary import RunSummary
 from tactile_lab.trust import INFO
+from tactile_lab.whole_file import failing_as
 
 KINDS: Mapping[str, type | tuple[type, ...]] = {
     "status": str,
@@ -128,22 +129,20 @@ def _folders(root: Path) -> Iterator[tuple[str, list[int]]]:
     Every file in a folder but one is replaced, not written into, so that the folder's
     own time changes with them; the one that people might edit is looked at, too.
     """
-    try:
-        with os.scandir(root) as found:
-            for item in found:
-                if not item.is_dir():
-                    continue
-                try:
-                    state = os.stat(f"{item.path}{os.sep}{INFO}")
-                    changed = item.stat().st_mtime_ns
-                except OSError:
-                    continue  # some other folder
-                yield item.name, [changed, state.st_mtime_ns, state.st_size]
-    except OSError as error:
-        raise RunFolderError(
-            f"{root} cannot be listed: {error.strerror}. Give the folder that holds "
-            "the runs."
-        ) from error
+    advice = "Give the folder that holds the runs."
+    with (
+        failing_as(f"{root} cannot be listed", advice, RunFolderError),
+        os.scandir(root) as found,
+    ):
+        for item in found:
+            if not item.is_dir():
+                continue
+            try:
+                state = os.stat(f"{item.path}{os.sep}{INFO}")
+                changed = item.stat().st_mtime_ns
+            except OSError:
+                continue  # some other folder
+            yield item.name, [changed, state.st_mtime_ns, state.st_size]
 
 
 def summary(path: Path) -> RunSummary:
