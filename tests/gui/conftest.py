@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from lane_stack import stack
+from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 from served_source import Source
 
@@ -138,9 +139,14 @@ def app() -> QApplication:
 
 @pytest.fixture(scope="module", autouse=True)
 def collected(app: QApplication) -> Iterator[None]:
-    """As in the program: a circle of Qt's, ended in another thread, ends the tests."""
+    """As in the program: a circle of Qt's, ended in another thread, ends the tests.
+
+    What is deleted later outside of any loop Qt keeps until it is asked for: a window
+    that a module left took F12 before that of the next ones.
+    """
     with collected_here():
         yield
+        app.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
 
 
 @pytest.fixture(scope="session")
