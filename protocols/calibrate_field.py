@@ -142,7 +142,8 @@ class CalibrateField(Protocol):
             "current_A": found.current.tolist(),
             "field_T": found.field.tolist(),
         }
-        return Conclusion(sentences, values, files=_file(run, found))
+        budgets = {"one field": found.budget}
+        return Conclusion(sentences, values, files=_file(run, found), budgets=budgets)
 
     def plots(self, run: Measurement) -> Iterator[Plot]:
         """Both branches of B2(I), and what the straight line leaves of them."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from tactile_lab.analysis.error_budget import ErrorBudget
 from tactile_lab.analysis.estimate import Estimate, student_95
 from tactile_lab.conclusion import NOT_STATED, Conclusion
 from tactile_lab.measurement import MeasuredTrial, Measurement
@@ -63,7 +65,8 @@ class ForceCheck(ForceProtocol):
         """F(I) - F(0) by Eq. (2) from current and field, and independent readings."""
         trials = run.results
         by_field = [_force_by_field(run, t) for t in trials]
-        bands = [_band(run, t, f) for t, f in zip(trials, by_field, strict=True)]
+        budgets = [_budget(run, t, f) for t, f in zip(trials, by_field, strict=True)]
+        bands = [None if budget is None else budget.whole for budget in budgets]
         values: dict[str, Any] = {
             "F_minus_F0_by_field_N": by_field,
             "F_minus_F0_uncertainty_N_95": bands,
@@ -81,7 +84,7 @@ class ForceCheck(ForceProtocol):
                 f"before each trial: {', '.join(known)} (95 %: scatter of the "
                 "readings, and what the bench states of Eq. (2))."
             )
-            field = Conclusion((said,), values)
+            field = Conclusion((said,), values, budgets=_widest(budgets))
             if run.force_uncertainty is None:
                 field += Conclusion((NOT_STATED,))
         return field + self._read_over_eq2(run)
@@ -104,6 +107,7 @@ class ForceCheck(ForceProtocol):
         freedom = max(1, levels.size - 1)
         error = float(np.sqrt(np.sum(left**2) / freedom / strength))
         known = Estimate.of(scale, error, freedom)
+        parts: dict[str, float | None] = {"readings": known.half, "force": None}
         said = (
             f"The force read is {plus_minus(scale, known.half)} (95 %) times that of "
             "Eq. (2)."
@@ -122,16 +126,27 @@ class ForceCheck(ForceProtocol):
             shared = run.force_uncertainty
             offset = shared.absolute * abs(float(levels.sum())) / strength
             open_ = scale * math.hypot(shared.relative, offset)
-            found["eq2_uncertainty_95"] = open_
+            found["eq2_uncertainty_95"] = parts["force"] = open_
             said += (
                 " What calibration and geometry leave open in Eq. (2) adds "
                 f"±{open_:.2g} (95 %)."
             )
-        return Conclusion((said,), found)
+        budgets = {"force read over Eq. (2)": ErrorBudget("", parts)}
+        return Conclusion((said,), found, budgets=budgets)
 
 
-def _band(run: Measurement, trial: MeasuredTrial, force: float | None) -> float | None:
-    """Half of the 95 % band of a force by the field, N: readings and Eq. (2)."""
+def _widest(budgets: Sequence[ErrorBudget | None]) -> dict[str, ErrorBudget]:
+    """That of the force by the field that is known least."""
+    known = [budget for budget in budgets if budget is not None]
+    if not known:
+        return {}
+    return {"F(I) − F(0) at most": max(known, key=lambda budget: budget.whole)}
+
+
+def _budget(
+    run: Measurement, trial: MeasuredTrial, force: float | None
+) -> ErrorBudget | None:
+    """What is not known of a force by the field, N; nobody states the meter's error."""
     if force is None or trial.held is None or run.newtons_per_tesla is None:
         return None
     start, end = trial.held
@@ -142,8 +157,8 @@ def _band(run: Measurement, trial: MeasuredTrial, force: float | None) -> float 
         scatters = read.size > 1 and np.ptp(read) > 0
         one = float(read.std(ddof=1)) if scatters else HALF_A_DIGIT
         scatter = math.hypot(scatter, student_95(read.size - 1) * one / read.size**0.5)
-    stated = run.uncertain(force) or 0.0
-    return math.hypot(stated, scatter * run.newtons_per_tesla)
+    stated, read_ = run.uncertain(force), scatter * run.newtons_per_tesla
+    return ErrorBudget("N", {"force": stated, "readings": read_, "meter": None})
 
 
 def _force_by_field(run: Measurement, trial: MeasuredTrial) -> float | None:

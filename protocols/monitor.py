@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
+from tactile_lab.analysis.error_budget import ErrorBudget
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import LimitError
 from tactile_lab.measurement import Measurement
@@ -55,8 +56,10 @@ class NoForce(Protocol):
         end, critical = float(trace.time[-1]), run.circuit.critical_V_C1
         distance = run.mean("V_C1", end - 1.0, end) - critical
         # an offset of its channel, its steps, and where the threshold may lie
-        moved = (other.critical_V_C1 - critical for other in run.displaced)
-        half = math.hypot(trace.code or 0.0, run.step_bias("V_C1"), *moved)
+        converter = math.hypot(trace.code or 0.0, run.step_bias("V_C1"))
+        moved = run.left_open(run.circuit, lambda other: other.critical_V_C1)
+        budget = ErrorBudget("V", {"converter": converter, **moved})
+        half = budget.whole
         where = "above" if distance > 0 else "below"
         tells = f"the sensor {'is silent' if distance > 0 else 'fires'} at rest"
         if abs(distance) <= half:
@@ -71,4 +74,4 @@ class NoForce(Protocol):
             "distance_to_threshold_V": distance,
             "distance_to_threshold_uncertainty_V_95": half,
         }
-        return Conclusion((said,), values)
+        return Conclusion((said,), values, budgets={"V_C1 to its critical": budget})

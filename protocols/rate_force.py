@@ -102,7 +102,7 @@ def _slope(run: Measurement) -> Conclusion:
     try:
         law = fit_rate_law(
             run.circuit, lambda time: believed.sample("V_P", time), trains,
-            run.displaced,
+            run.displaced.values(),
         )  # fmt: skip
     except NotIdentifiableError as reason:
         return Conclusion((), {"slopes": None}, (f"No slope: {reason}.",))

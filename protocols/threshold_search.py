@@ -223,7 +223,7 @@ def _gate(run: Measurement, found: Bracket, force_error: float) -> Conclusion:
     )
     try:
         low, high = V_GS_of_onset(
-            run.circuit, silent, fires, force_error, run.displaced
+            run.circuit, silent, fires, force_error, run.displaced.values()
         )
     except NotIdentifiableError as reason:
         return Conclusion((f"No V_GS explains the critical force: {reason}.",))

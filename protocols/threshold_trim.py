@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from tactile_lab.analysis.error_budget import ErrorBudget
 from tactile_lab.analysis.rate_force import Bracket
 from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
 from tactile_lab.errors import LimitError, NotIdentifiableError
@@ -228,10 +228,11 @@ class TrimmedGate(Bracket):
             f'it, write [sensor] V_GS = "{self.middle:.5f} V" and sourced = ["V_GS"].'
         ]
         error = run.source_error("V_GS", self.middle)
-        values["V_GS_uncertainty_V"] = whole = (
-            None if error is None else math.hypot(self.half_width, error)
-        )
-        if whole is not None:
+        parts = {"resolution": self.half_width, "source": error}
+        budgets = {"V_GS": ErrorBudget("V", parts)}
+        whole = budgets["V_GS"].whole
+        values["V_GS_uncertainty_V"] = None if error is None else whole
+        if error is not None:
             sentences.append(
                 f"By another voltmeter it is known to ±{show(whole, 'V', 2)}: the "
                 "bound that the source's maker gives for its reading is in it."
@@ -240,17 +241,19 @@ class TrimmedGate(Bracket):
             left = self.half_width / abs(run.circuit.k_F)
             values["critical_force_half_width_N"] = left
             known = run.uncertain(wanted)
+            budget = ErrorBudget("N", {"resolution": left, "force": known})
+            budgets["critical force"] = budget
             told = f"The critical force is within ±{show(left, 'N', 2)} of that"
             if known is None:
                 sentences += [f"{told} (k_F of Eqs. (3)-(6)).", NOT_STATED]
             else:
-                both = math.hypot(left, known)
+                both = budget.whole
                 values["critical_force_uncertainty_N_95"] = both
                 sentences.append(
                     f"{told} (k_F of Eqs. (3)-(6)); with the calibration's "
                     f"uncertainty ±{show(both, 'N', 2)} (95 %)."
                 )
-        return Conclusion(tuple(sentences), values)
+        return Conclusion(tuple(sentences), values, budgets=budgets)
 
 
 def _spikes(trials: Sequence[MeasuredTrial], level: float) -> int | None:

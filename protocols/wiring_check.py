@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from tactile_lab.analysis.error_budget import ErrorBudget
 from tactile_lab.analysis.estimate import Z95
 from tactile_lab.analysis.wiring import (
     NODES,
@@ -241,11 +242,14 @@ def _gate(run: Measurement, circuit: Circuit, V_C1: float, half: float) -> Concl
     """V_GS that explains V_C1 at rest, whose band has half this width, V."""
     from tactile_lab.model.equations import rest_V_C1
 
+    budgets = {"V_C1 at rest": ErrorBudget("V", {"converter": half})}
     try:
-        gate = explaining_V_GS(circuit, V_C1, half / Z95, run.displaced)
+        gate = explaining_V_GS(circuit, V_C1, half / Z95, run.displaced.values())
+        alone = explaining_V_GS(circuit, V_C1, half / Z95)
+        moved = run.left_open(circuit, lambda c: explaining_V_GS(c, V_C1, 0.0).value)
     except NotIdentifiableError as reason:
         said = f"{str(reason)[0].upper()}{str(reason)[1:]}."
-        return Conclusion((said,), {"V_GS": None})
+        return Conclusion((said,), {"V_GS": None}, budgets=budgets)
     said = (
         f"V_C1 rests at {plus_minus(V_C1, half, 'V')}, the model at "
         f"{show(rest_V_C1(circuit), 'V')}: a V_GS of {show(gate.value, 'V')} "
@@ -259,4 +263,5 @@ def _gate(run: Measurement, circuit: Circuit, V_C1: float, half: float) -> Concl
         "high_95": gate.high,
         "is_bound": True,
     }
-    return Conclusion((said,), {"V_GS": values})
+    budgets["V_GS"] = ErrorBudget("V", {"converter": alone.half, **moved})
+    return Conclusion((said,), {"V_GS": values}, budgets=budgets)

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from tactile_lab.analysis.error_budget import ErrorBudget, budget_line
 from tactile_lab.analysis.estimate import Estimate
 
 WIDTH = 100
@@ -90,6 +91,7 @@ class Conclusion:
         tables: for people, too.
         files: texts to be kept in the run's folder, by name. One that is there already
             stays, and none is ever changed.
+        budgets: what each cause of uncertainty contributes to its numbers, by what of.
     """
 
     sentences: tuple[str, ...] = ()
@@ -97,6 +99,7 @@ class Conclusion:
     missing: tuple[str, ...] = ()
     tables: tuple[Table, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
+    budgets: Mapping[str, ErrorBudget] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse by TypeError what neither terminal nor page can show."""
@@ -105,6 +108,9 @@ class Conclusion:
         for table in self.tables:
             if not isinstance(table, Table):
                 raise TypeError(f"tables hold {table!r}; make it a Table")
+        for budget in self.budgets.values():
+            if not isinstance(budget, ErrorBudget):
+                raise TypeError(f"budgets hold {budget!r}; make it an ErrorBudget")
 
     def __add__(self, other: Conclusion) -> Conclusion:
         """Both, one after the other."""
@@ -114,6 +120,7 @@ class Conclusion:
             (*self.missing, *other.missing),
             (*self.tables, *other.tables),
             {**self.files, **other.files},
+            {**self.budgets, **other.budgets},
         )
 
     @property
@@ -125,6 +132,11 @@ class Conclusion:
         )
         parts = ("\n".join(self.sentences), *tables)
         return "\n\n".join(part for part in parts if part)
+
+    @property
+    def budget_line(self) -> str:
+        """The error budgets as one line; "" without any."""
+        return budget_line(self.budgets, "Error budget (95 % or bound)")
 
     @property
     def plain(self) -> dict[str, Any]:

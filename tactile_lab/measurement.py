@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -180,8 +180,8 @@ class Measurement:
         traces: decimated signals, the derived I_DS and the model's V_C1 among them.
         circuit: the sensor as it is believed to be, to compare with, or None.
         listed: whether the current was played as a waveform, not as set-points.
-        displaced: the circuit with each thing that is not known of it, such as the
-            follower's input bias or its temperature, at the end of its 95 % band.
+        displaced: by cause, "follower" or "temperature", the circuit with what is not
+            known of it at the end of its 95 % band.
         lag_uncertainty: the same of the lags of coil and core together, s; None where
             the bench does not state it.
         searched: whether spikes were looked for.
@@ -205,7 +205,7 @@ class Measurement:
     voltages: Mapping[str, FloatArray] = dataclasses.field(default_factory=dict)
     traces: tuple[RecordedSignal, ...] = ()
     circuit: Circuit | None = None
-    displaced: tuple[Circuit, ...] = ()
+    displaced: Mapping[str, Circuit] = dataclasses.field(default_factory=dict)
     listed: bool = False
     lag_uncertainty: float | None = None
     searched: bool = True
@@ -270,7 +270,7 @@ class Measurement:
         hold = begin + FOLLOWED - trial.start, trial.hold[1]
         try:
             found = fit_circuit_adaptation(
-                self.circuit, trial.spike_times, hold, self.displaced
+                self.circuit, trial.spike_times, hold, self.displaced.values()
             )
         except NotIdentifiableError as error:
             return None, str(error)
@@ -404,6 +404,21 @@ class Measurement:
             return None
         before = self.current[:, 0] <= time
         return float(self.current[before][-1, 1]) if before.any() else None
+
+    def left_open(
+        self, circuit: Circuit, of: Callable[[Circuit], float]
+    ) -> dict[str, float | None]:
+        """What is not known of `circuit` leaves open of a number, by cause.
+
+        That is half of the 95 % band, in the number's unit; None where the scene does
+        not state how well the temperature is known.
+        """
+        here = of(circuit)
+        found: dict[str, float | None] = {
+            cause: abs(of(other) - here) for cause, other in self.displaced.items()
+        }
+        found.setdefault("temperature", None)
+        return found
 
     def uncertain(self, force: float | None) -> float | None:
         """Half of the 95 % band of `force` N, N; None where nothing is stated."""

@@ -13,7 +13,7 @@ Eq. (15) with this V_P(t) is the rate that is drawn.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,7 +73,7 @@ def fit_circuit_adaptation(
     circuit: Circuit,
     spike_times: ArrayLike,
     hold: tuple[float, float],
-    displaced: Sequence[Circuit] = (),
+    displaced: Collection[Circuit] = (),
 ) -> CircuitAdaptation:
     """Fit tau, V_GS and V_P to the spikes within a hold.
 

@@ -1,39 +1,35 @@
-"""What each cause of uncertainty contributes to spike times and to V_C1.
-
-Numerics are the solver's own estimate and the straight pieces the field is drawn with.
-"""
+"""What each cause of uncertainty contributes to a number; a line in a report's head."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-
-from tactile_lab.analysis.belief import Belief
-from tactile_lab.analysis.spike_pairs import irregularity
-from tactile_lab.analysis.twin import Twin
-from tactile_lab.quantity import show
-
-CAUSES = ("numerics", "clocks", "follower", "lag", "force", "temperature", "noise")
+from tactile_lab.quantity import rounded, show
 
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """Half-widths of 95 % bands by cause, medians over the run.
+    """Half-widths of 95 % bands, or bounds, by cause.
 
     Attributes:
-        unit: of all values.
-        parts: by the names in `CAUSES`; None where nobody has stated the cause's size.
+        unit: of all values, SI; "" of a factor.
+        parts: by the name of the cause; None where nobody has stated the cause's size.
+        bound: all together, where they do not add as squares.
     """
 
     unit: str
     parts: Mapping[str, float | None]
+    bound: float | None = None
 
     @property
     def whole(self) -> float:
         """All that is stated, together."""
-        return float(np.sqrt(sum(part**2 for part in self.parts.values() if part)))
+        if self.bound is not None:
+            return self.bound
+        return math.sqrt(sum(part**2 for part in self.parts.values() if part))
 
     @property
     def text(self) -> str:
@@ -42,59 +38,22 @@ class ErrorBudget:
             name: part for name, part in self.parts.items() if part and part > 1e-18
         }
         silent = [name for name, part in self.parts.items() if part is None]
-        text = f"±{show(self.whole, self.unit, 2)}"
+        text = f"±{self._shown(self.whole)}"
         if told:
-            parts = (f"{name} {show(v, self.unit, 2)}" for name, v in told.items())
+            parts = (f"{name} {self._shown(part)}" for name, part in told.items())
             text += f" = {', '.join(parts)}"
         return text + (f"; {', '.join(silent)} not stated" if silent else "")
 
+    def _shown(self, size: float) -> str:
+        return show(size, self.unit, 2) if self.unit else rounded(size)
 
-def spike_time_budget(twin: Twin, belief: Belief) -> ErrorBudget | None:
-    """That of the predicted spikes, s; None where none were matched.
-
-    Noise is what the irregularity of the intervals has added up to at a spike.
-    """
-    matched = twin.spikes
-    if matched is None or not matched.offsets.size:
-        return None
-    noise = matched.scatter
-    return _budget("s", matched.open, twin.result.error.spike_time, noise, belief)
+    @property
+    def plain(self) -> dict[str, Any]:
+        """For machines."""
+        return {"unit": self.unit, "whole": self.whole, **self.parts}
 
 
-def V_C1_budget(twin: Twin, belief: Belief) -> ErrorBudget | None:
-    """That of the predicted V_C1 against its channel, V; None without V_C1.
-
-    Noise is the scatter of its bins and one code of the converter.
-    """
-    residual = twin.residual("V_C1")
-    if residual is None or not residual.time.size:
-        return None
-    noise = float(
-        np.hypot(irregularity(residual.difference), _of(residual.open, "codes"))
-    )
-    return _budget("V", residual.open, twin.result.error.V_C1, noise, belief)
-
-
-def _budget(
-    unit: str,
-    parts: Mapping[str, np.ndarray],
-    numerics: float | None,
-    noise: float,
-    belief: Belief,
-) -> ErrorBudget:
-    stated, drawn = belief.stated, belief.magnet.lag.drawn
-    if unit != "s":  # what V_C1 changes in that time
-        drawn *= _of(parts, "clocks") / belief.clock if belief.clock else 0.0
-    known = {
-        name: _of(parts, name) if stated.get(name, True) else None for name in CAUSES
-    }
-    known["numerics"] = float(np.hypot(numerics or 0.0, drawn))
-    known["noise"] = noise if np.isfinite(noise) else 0.0
-    return ErrorBudget(unit, known)
-
-
-def _of(parts: Mapping[str, np.ndarray], name: str) -> float:
-    """Median of one part over the run; 0 where there is none."""
-    part = parts.get(name, np.zeros(1))
-    finite = part[np.isfinite(part)]
-    return float(np.median(finite)) if finite.size else 0.0
+def budget_line(budgets: Mapping[str, ErrorBudget], of: str) -> str:
+    """Budgets by what they are of, as one line; "" without any."""
+    told = ". ".join(f"{what} {budget.text}" for what, budget in budgets.items())
+    return f"{of}: {told}." if told else ""

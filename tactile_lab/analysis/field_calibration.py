@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from tactile_lab.analysis.error_budget import ErrorBudget
 from tactile_lab.analysis.estimate import Estimate, Line
 from tactile_lab.arrays import FloatArray
 from tactile_lab.calibration import COIL, HASH, UNCERTAINTY, VALID_UNTIL, table_hash
@@ -25,7 +26,7 @@ WARMING = 30.0
 MANY = 10_000
 """Degrees of freedom of what all readings tell together: a normal distribution's."""
 Z90 = 1.6448536269514722
-"""Of a normal distribution, 5 % lie above: an edge is left to one side only."""
+"""Of a normal distribution, 5 % lie above."""
 READ_BACK_NOISE = 2e-4
 """Current by which an end may differ from the whole mA it was asked to be, A. The field
 is known no better than to what it makes of that."""
@@ -66,9 +67,9 @@ class FieldCalibration:
             T; None where no step was repeated.
         warming: of the winding meanwhile, K; None where it is not known. It has no
             interval: a source states none for the resistance that it reads.
-        uncertainty: half of the 95 % band of one field value, T: of those that came
-            from saturation, which lie at the loop's edge, it holds 95 %, readings and
-            drift included; all others lie further inside.
+        budget: of one field value, T: half of the band that holds 95 % of those that
+            came from saturation, which lie at the loop's edge, with what readings and
+            drift leave open; all others lie further inside.
         warnings: what to look at before it is used.
     """
 
@@ -80,8 +81,13 @@ class FieldCalibration:
     offset: Estimate
     drift: Estimate | None
     warming: float | None
-    uncertainty: float
+    budget: ErrorBudget
     warnings: tuple[str, ...]
+
+    @property
+    def uncertainty(self) -> float:
+        """Half of that band, T."""
+        return self.budget.whole
 
 
 def fit_field(
@@ -151,13 +157,13 @@ def fit_field(
         offset=line.offset,
         drift=drift,
         warming=warming,
-        uncertainty=half_width + Z90 * _edge_error(noise, drift),
+        budget=_edge(half_width, noise, drift),
         warnings=tuple(warnings),
     )
 
 
-def _edge_error(noise: float, drift: Estimate | None) -> float:
-    """Standard uncertainty of either edge of the loop, T.
+def _edge(half_width: float, noise: float, drift: Estimate | None) -> ErrorBudget:
+    """What is not known of one field, T, where the loop's edge lies so far from it.
 
     A third of the readings' variance is left in a field between two steps of both
     branches, and half of it in the loop at 0 A. What drifted, beyond what the readings
@@ -166,7 +172,15 @@ def _edge_error(noise: float, drift: Estimate | None) -> float:
     moved = 0.0
     if drift is not None:
         moved = max(0.0, drift.value**2 - drift.error**2) / 3
-    return math.sqrt(noise**2 * (1 / 3 + 1 / 2) + moved)
+    read = noise**2 * (1 / 3 + 1 / 2)
+    parts = {
+        "loop": half_width,
+        "readings": Z90 * math.sqrt(read),
+        "drift": None if drift is None else Z90 * math.sqrt(moved),
+        "meter": None,  # nobody states its error
+    }
+    # an edge is left to one side only
+    return ErrorBudget("T", parts, half_width + Z90 * math.sqrt(read + moved))
 
 
 def _drift(steps: Sequence[FieldStep], slope: float) -> Estimate | None:

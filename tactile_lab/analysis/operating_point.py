@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import replace
 
 from tactile_lab.errors import NotIdentifiableError
@@ -23,7 +23,7 @@ def V_GS_of_onset(
     silent: Waveform,
     fires: Waveform,
     force_error: float = 0.0,
-    displaced: Sequence[Circuit] = (),
+    displaced: Collection[Circuit] = (),
 ) -> tuple[float, float]:
     """Least and largest V_GS with which the model agrees with two trials from rest, V.
 

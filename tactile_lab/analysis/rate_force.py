@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,7 +129,7 @@ def fit_rate_law(
     circuit: Circuit,
     V_P: Callable[[FloatArray], FloatArray],
     trains: Sequence[FloatArray],
-    displaced: Sequence[Circuit] = (),
+    displaced: Collection[Circuit] = (),
 ) -> RateLaw:
     """Fit V_GS and the scale of V_P to the intervals of several holds.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -314,7 +314,7 @@ def hum(time: ArrayLike, values: ArrayLike, frequency: float = 50.0) -> float:
 
 
 def explaining_V_GS(
-    circuit: Circuit, V_C1: float, error: float, displaced: Sequence[Circuit] = ()
+    circuit: Circuit, V_C1: float, error: float, displaced: Collection[Circuit] = ()
 ) -> Estimate:
     """V_GS that explains a rest V_C1, Eqs. (8) and (16), with its uncertainty.
 

@@ -257,11 +257,11 @@ def print_run(done: Executed, report: Report | None, took: float) -> None:
             f"{run.duration:.1f} s of experiment in {took:.1f} s "
             f"({done.took:.1f} s of it running)."
         )
+        for line in report.findings.budget_lines:
+            say(line)
         beside = report.findings.beside
-        if beside is not None:
-            say(beside.budget_line)
-            if beside.explanation is not None:
-                say(f"The model misses by more. {beside.explanation.text}")
+        if beside is not None and beside.explanation is not None:
+            say(f"The model misses by more. {beside.explanation.text}")
         if run.accuracy:
             say(run.accuracy)
         if run.loss is not None:

@@ -52,6 +52,12 @@ class Findings:
         further = (p for p in (twin, drift_plot(self.run)) if p is not None)
         return (*self.answers, *general, *further)
 
+    @property
+    def budget_lines(self) -> tuple[str, ...]:
+        """What the numbers rest on: those of the protocol, those of the model."""
+        model = "" if self.beside is None else self.beside.budget_line
+        return tuple(filter(None, (self.conclusion.budget_line, model)))
+
 
 def find(run: RunData) -> Findings:
     """What a run tells.

@@ -58,7 +58,7 @@ def page(findings: Findings, pictures: Sequence[tuple[Plot, str]]) -> str:
         drift=drawn.pop("drift", None),
         answers=tuple(drawn.values()),
         beside=() if beside is None else sentences(beside, run),
-        budget="" if beside is None else beside.budget_line,
+        budgets=findings.budget_lines,
         drift_said=(said,) if said else (),
         certificate=_certificate(run),
         settings=_settings(run),

@@ -59,6 +59,9 @@ def results(findings: Findings) -> dict[str, Any]:
             if t.source == "measured" and t.overrange.size
         },
         "conclusion": findings.conclusion.plain,
+        "error_budget_95": {
+            what: budget.plain for what, budget in findings.conclusion.budgets.items()
+        },
         "statements": list(findings.conclusion.sentences),
         "tables": [asdict(table) for table in findings.conclusion.tables],
         "plots": [plot.to_dict() for plot in findings.answers],

@@ -9,14 +9,11 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from tactile_lab.analysis.belief import Belief
-from tactile_lab.analysis.error_budget import (
-    ErrorBudget,
-    V_C1_budget,
-    spike_time_budget,
-)
+from tactile_lab.analysis.error_budget import ErrorBudget, budget_line
 from tactile_lab.analysis.spike_pairs import Matched
 from tactile_lab.analysis.suspects import Explanation, explain
 from tactile_lab.analysis.twin import Measured, Residual, Twin, twin
+from tactile_lab.analysis.twin_budget import V_C1_budget, spike_time_budget
 from tactile_lab.arrays import FloatArray
 from tactile_lab.measurement import Measurement, RecordedSignal
 from tactile_lab.model.temperature import temperature
@@ -46,10 +43,7 @@ class BesideModel:
     @property
     def budget_line(self) -> str:
         """The error budgets as one line; "" where nothing was compared."""
-        told = (f"{what} {budget.text}" for what, budget in self.budgets.items())
-        if not self.budgets:
-            return ""
-        return f"Model (95 %, median over the run): {'. '.join(told)}."
+        return budget_line(self.budgets, "Model (95 %, median over the run)")
 
 
 def with_twin(run: RunData) -> tuple[RunData, BesideModel | None]:
@@ -128,8 +122,7 @@ def to_dict(beside: BesideModel) -> dict[str, Any]:
     named = None if explanation is None else explanation.cause
     return {
         "error_budget_95": {
-            what: {"unit": budget.unit, "whole": budget.whole, **budget.parts}
-            for what, budget in beside.budgets.items()
+            what: budget.plain for what, budget in beside.budgets.items()
         },
         "explanation": None
         if explanation is None

@@ -60,12 +60,22 @@ class Scene:
         return replace(self.sensor.circuit, I_bias=followers.input_bias)
 
     @property
-    def displaced(self) -> tuple[Circuit, ...]:
-        """`circuit` with each thing not known of it at the end of its 95 % band."""
+    def displaced(self) -> dict[str, Circuit]:
+        """By cause `circuit` with what is not known of it at the end of its 95 % band.
+
+        A cause that the bench does not state, or none at all, is not among them.
+        """
         followers, kelvin = self.bench.followers, self.sensor.temperature_uncertainty
         bias = 0.0 if followers is None else followers.input_bias_uncertainty
-        off = Deviation(input_bias=bias), Deviation(temperature=kelvin or 0.0)
-        return tuple(one.circuit(self.circuit) for one in off if one != Deviation())
+        off = {
+            "follower": Deviation(input_bias=bias),
+            "temperature": Deviation(temperature=kelvin or 0.0),
+        }
+        return {
+            cause: one.circuit(self.circuit)
+            for cause, one in off.items()
+            if one != Deviation()
+        }
 
     @property
     def sensor_alone(self) -> Scene:

@@ -66,7 +66,7 @@ class Run(StoredRun):
             self.scene.circuit,
             self.spikes["time"],
             (max(start, arrived) + FOLLOWED, end),
-            self.scene.displaced,
+            self.scene.displaced.values(),
         )
 
     def to_xarray(

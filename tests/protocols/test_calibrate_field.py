@@ -40,12 +40,17 @@ def calibrated(tmp_path_factory):
 
 
 def test_drift_and_temperature_are_checked_and_told(calibrated):
-    found = json.loads((calibrated / "results.json").read_text())["conclusion"]
+    told = json.loads((calibrated / "results.json").read_text())
+    found, budget = told["conclusion"], told["error_budget_95"]["one field"]
     assert found["slope_T_per_A"] == pytest.approx(0.011, rel=1e-3)
     assert abs(found["drift_T"]) < 1e-6
     assert 0 <= found["warming_K"] < 10
     # the loop of mild steel, 50 mA to either side
     assert found["uncertainty_T"] == pytest.approx(0.05 * 0.011, rel=0.02)
+    assert budget["whole"] == found["uncertainty_T"] >= budget["loop"]
+    head = (calibrated / "report.html").read_text().partition("<h2>")[0]
+    assert "Error budget (95 % or bound): one field ±550 µT = loop 550 µT" in head
+    assert "; meter not stated." in head
 
 
 def test_the_file_tells_its_origin_and_covers_what_was_measured(calibrated):

@@ -277,7 +277,7 @@ def test_threshold_search_carries_the_follower_s_bias_into_V_GS():
         circuit=believed,
     )
     biased = replace(believed, I_bias=believed.I_bias + 20e-12)
-    found = search.conclude(replace(run, displaced=(biased,)))
+    found = search.conclude(replace(run, displaced={"follower": biased}))
     low, high = found.values["V_GS_low_V"], found.values["V_GS_high_V"]
     assert low < believed.V_GS < high
     assert "95 %, the circuit's other parameters as believed) explains" in found.text

@@ -118,6 +118,12 @@ def test_the_conclusion_tells_V_GS_its_errors_and_the_check():
         0.005 / Circuit().k_F
     )
     assert found.values["checked"] is True and not found.missing
+    whole = found.values["V_GS_uncertainty_V"]
+    assert found.budgets["V_GS"].plain == {
+        "unit": "V", "whole": whole, "resolution": found.values["V_GS_half_width_V"],
+        "source": pytest.approx(error),
+    }  # fmt: skip
+    assert found.budget_line.endswith("; force not stated.")
     assert 'V_GS = "1.40500 V"' in found.text
 
 

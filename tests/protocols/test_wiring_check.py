@@ -1,6 +1,7 @@
 """Each mistake in the wiring, made on the simulated bench, is named by its verdict."""
 
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -28,7 +29,7 @@ def checked(folder, *overrides, **faults):
     assert done.state is RunState.COMPLETE, done.reason
     findings = find(read(done.folder))
     values = json.loads(json.dumps(results(findings)))["conclusion"]
-    return values, findings.conclusion.sentences
+    return values, (*findings.conclusion.sentences, *findings.budget_lines)
 
 
 def test_a_right_bench_passes_and_tells_its_v_gs(tmp_path):
@@ -45,6 +46,8 @@ def test_a_right_bench_passes_and_tells_its_v_gs(tmp_path):
     # the whole window shows 0 V, nothing of V_S that comes after it: half a code
     assert channels["V_K"]["offset_V"] == pytest.approx(-10 / 508, rel=1e-6)
     gate = values["V_GS"]
+    *_, budget = sentences
+    assert re.search(r"V_GS ±\S+ mV = converter \S+ mV; temperature not", budget)
     assert gate["low_95"] < 1.4 < gate["high_95"]
     assert gate["high_95"] - gate["low_95"] < 0.1  # tens of mV: 8 bits over 10 V
     assert any("threshold_search" in s for s in sentences)

@@ -1,6 +1,7 @@
 """What a report concludes from runs of the other protocols, on plain values."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -110,6 +111,9 @@ def test_force_check_finds_the_slip_in_table_1():
     assert "eq2_uncertainty_95" not in found.values
     known = replace(read, force_uncertainty=ForceUncertainty(0.0, 0.1))
     values = find(known).conclusion.values
+    factor = "force read over Eq. (2) ±0.015 = readings 0.015"
+    assert f"{factor}; force not stated" in "".join(find(read).budget_lines)
+    assert "not stated" not in find(known).conclusion.budget_line
     assert values["eq2_uncertainty_95"] == pytest.approx(0.1 * values["read_over_eq2"])
 
 
@@ -123,6 +127,9 @@ def test_a_teslameter_that_hangs_is_no_exact_one():
     assert found.values["F_minus_F0_by_field_N"] == [pytest.approx(0, abs=1e-9)]
     assert band is not None and 20e-6 < band < 1e-3
     assert "F(0) in the second before each trial" in found.sentences[0]
+    (budget,) = found.budgets.values()
+    assert budget.whole == band == budget.parts["readings"]
+    assert budget.text.endswith("; force, meter not stated")
 
 
 def test_monitor_tells_the_distance_to_threshold():
@@ -133,10 +140,14 @@ def test_monitor_tells_the_distance_to_threshold():
     drawn = overview(replace(run, searched=True))
     assert "Rate" not in [panel.label for panel in drawn.panels], "there is none"
     coded = tuple(replace(trace, code=16e-3) for trace in run.traces)
-    biased = (replace(Circuit(), I_bias=20e-12),)
+    biased = {"follower": replace(Circuit(), I_bias=20e-12)}
     told = find(replace(run, traces=coded, displaced=biased)).conclusion
     half = told.values["distance_to_threshold_uncertainty_V_95"]
     assert 16e-3 < half < 24e-3
+    line, *_ = find(replace(run, traces=coded, displaced=biased)).budget_lines
+    assert line.startswith("Error budget (95 % or bound): V_C1 to its critical ±")
+    assert re.search(r"= converter 1\d mV, follower 2.1 mV; temperature not", line)
+    assert told.budgets["V_C1 to its critical"].whole == half
     assert "mV above the critical" in told.sentences[0]
     assert told.sentences[0].endswith("the sensor is silent at rest.")
     # the very V_GS at which it fires, but for 10 mV of V_C1

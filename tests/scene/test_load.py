@@ -83,12 +83,13 @@ def test_preset_first_then_single_keys(scene_file):
 
 
 def test_what_is_stated_to_be_uncertain_of_the_circuit_is_known_to_fits():
-    bias, warm = load("demo", ['sensor.temperature_uncertainty="2 K"']).displaced
+    found = load("demo", ['sensor.temperature_uncertainty="2 K"']).displaced
     believed = load("demo").circuit
-    assert bias == replace(believed, I_bias=believed.I_bias + 20e-12)
-    assert warm == at_temperature(believed, temperature(believed) + 2)
+    bias = replace(believed, I_bias=believed.I_bias + 20e-12)
+    warm = at_temperature(believed, temperature(believed) + 2)
+    assert found == {"follower": bias, "temperature": warm}
     alone = ['sensor.temperature_uncertainty="0 K"', 'bench.followers.bandwidth="0 Hz"']
-    assert load("demo", alone).displaced == (bias,)
+    assert load("demo", alone).displaced == {"follower": bias}
 
 
 def test_explicit_thresholds_override_what_firing_sets(scene_file):
