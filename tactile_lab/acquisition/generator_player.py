@@ -128,7 +128,7 @@ class GeneratorPlayer:
         try:
             if self._began is None or self.loaded is None:
                 return
-            self._scope.end_stream()
+            self._scope.end_stream(at_once=True)
             flowing = float(self.loaded.at(self._clock.now() - self._began[0]))
             begun, slew = (
                 self._clock.now(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Sequence
 
@@ -11,10 +12,13 @@ from numpy.typing import NDArray
 from tactile_lab.acquisition.instrument_thread import InstrumentThread, drained
 from tactile_lab.clock import Clock
 from tactile_lab.errors import InstrumentError, RecordingError
-from tactile_lab.scope import Block, Channel, Scope, Stream
+from tactile_lab.scope import CLOCK_ERROR, Block, Channel, Scope, Stream
 
 QUEUE = 256
 """Blocks that may wait for the deciding loop."""
+
+LATE = 1.0
+"""How long to wait for what was sampled before a stream is to end, s."""
 
 
 class ScopeThread(InstrumentThread):
@@ -33,6 +37,7 @@ class ScopeThread(InstrumentThread):
         self._wanted: tuple[tuple[Channel, ...], float] | None = None
         self._halt = False
         self._due: float | None = None
+        self._lag = self._reached = math.inf
         self._jobs: deque[Callable[[], None]] = deque()
         self.before_close: Callable[[], None] | None = None
 
@@ -95,7 +100,8 @@ class ScopeThread(InstrumentThread):
             if self._wanted is not None and self.stream is None:
                 self.stream = self.scope.start(*self._wanted)
                 self.settings.update(self.scope.settings())
-                self._wanted = None
+                self._wanted, self._lag = None, math.inf
+                self._reached = self.stream.started
                 self.clock.notify()
                 poll = self.clock.now() + self.scope.poll_interval
             due = self._due is not None and now >= self._due
@@ -107,7 +113,7 @@ class ScopeThread(InstrumentThread):
                     poll = now + self.scope.poll_interval
             self.clock.wait_for(self._called, self._wake(poll))
         if self.stream is not None:
-            self._poll()
+            self._poll_last(self.stream)
 
     def make_safe_and_close(self) -> None:
         """Stop the stream and close."""
@@ -136,21 +142,54 @@ class ScopeThread(InstrumentThread):
             return None
         return poll if self._due is None else min(poll, self._due)
 
-    def end_stream(self) -> None:
-        """Hand over the last samples and stop; only in the scope's thread."""
+    def end_stream(self, *, at_once: bool = False) -> None:
+        """Hand over the last samples and stop; only in the scope's thread.
+
+        Args:
+            at_once: without those that are late.
+        """
         if self.stream is not None:
-            self._poll()
+            if at_once:
+                self._poll()
+            else:
+                self._poll_last(self.stream)
             self.scope.stop()
         self.stream, self._halt, self._due = None, False, None
         self.clock.notify()
+
+    def _poll_last(self, stream: Stream) -> None:
+        """Poll until all that was sampled by now has come, however late it is.
+
+        A scope that stops drops what it still holds, and no count would tell of it.
+        """
+        asked = self.clock.now()
+        lag = self._lag + CLOCK_ERROR * (asked - self._reached) + stream.interval
+        self._poll()
+        while stream.gapless and self._reached < asked - lag and not self._jobs:
+            if self.clock.now() >= asked + LATE:
+                return  # the stop tells what is missing
+            self.clock.sleep_until(self.clock.now() + self.scope.poll_interval)
+            self._poll()
 
     def _poll(self) -> None:
         asked = self.clock.now()
         block = self.scope.poll()
         if block is not None:
+            self._note_lag(block)
             self._hand_over(block)
         self.polled_until = asked
         self.clock.notify()
+
+    def _note_lag(self, block: Block) -> None:
+        """Follow the least lag of the samples, as far as two clocks may part."""
+        if self.stream is None:
+            return
+        before = self._reached
+        self._reached = (
+            self.stream.started + (block.first + block.samples) * self.stream.interval
+        )
+        parted = CLOCK_ERROR * (self._reached - before)
+        self._lag = min(self._lag + parted, block.received - self._reached)
 
     def _hand_over(self, block: Block) -> None:
         if len(self._queue) >= QUEUE:

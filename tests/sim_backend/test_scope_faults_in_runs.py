@@ -12,7 +12,7 @@ from sim_backend.picoscope.faults import ScopeFault
 from sim_backend.picoscope.scope import UnitModel
 from sim_backend.picoscope.sdk import FakePs3000a
 from tactile_lab.acquisition.ending import Executed
-from tactile_lab.acquisition.events import Event, Message, RunState
+from tactile_lab.acquisition.events import Event, Message, Progress, RunState
 from tactile_lab.engine.execution import Execution
 from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
@@ -108,6 +108,24 @@ def test_a_loss_that_only_the_last_poll_finds_is_told(tmp_path: Path) -> None:
     verdict = verify(done.folder)
     assert "Samples are missing" in verdict.notes[0]
     assert "not known how many" in str(verdict.certificate)
+
+
+def test_samples_that_come_late_as_the_run_is_stopped_are_kept(tmp_path: Path) -> None:
+    scene = load("demo", OVERRIDES)
+    late = ScopeFault(kind="late", sample=530_000, samples=100_000, duration=0.12)
+    bench = open_bench(scene, needs(scene), scope_faults=(late,))
+
+    def stop(event: Event) -> None:
+        if isinstance(event, Progress) and event.elapsed > 0.4:
+            execution.stop("a person pressed STOP")
+
+    execution = Execution(scene, tmp_path, bench=bench, emit=stop)
+    done = execution.run()
+    assert done.state is RunState.ABORTED and done.off.verified
+    with Run.load(done.folder) as stored:
+        verified_off = stored.current["time"][-1]
+        assert stored.axis.time_of(float(stored.samples)) > verified_off
+    assert verify(done.folder).certificate.clean
 
 
 def run_slowly(folder: Path, *faults: ScopeFault) -> tuple[Executed, FakePs3000a]:
