@@ -1,8 +1,9 @@
 """Code in runs: that of a run from elsewhere is not executed until somebody trusts it.
 
-A run folder keeps the Python files it was made from (a protocol, a driver), and whoever
-reads or repeats the run executes them. Those of runs recorded here are known by their
-SHA-256; of others `tactile-lab trust RUN` says what they are and makes them known.
+A run folder keeps the Python files it was made from (a protocol, a driver) and names
+the library of its scope; whoever reads or repeats the run executes them. Those of runs
+made here are known by their SHA-256; of others `tactile-lab trust RUN` says what they
+are and makes them known.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ def code_named(table: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
         path = folder / file
         held = tomllib.loads(read_text(path, "Bench file"))
         found += [path.parent / name for name in _code(held)]
-    return tuple(path.resolve() for path in found if path.is_file())
+    return tuple(dict.fromkeys(path.resolve() for path in found if path.is_file()))
 
 
 def check(table: Mapping[str, Any], folder: Path) -> None:
@@ -63,13 +64,13 @@ def check(table: Mapping[str, Any], folder: Path) -> None:
 
 
 def remember(files: Iterable[Path]) -> None:
-    """Make the code in `files` known here; what is no code is left out.
+    """Make the code in `files` known here.
 
     Raises:
         OSError: that cannot be written down.
     """
     known = _known()
-    code = {_digest(path): path for path in files if _is_code(path.name)}
+    code = {_digest(path): path for path in files}
     new = {found: path for found, path in code.items() if found not in known}
     if new:
         known_file().parent.mkdir(parents=True, exist_ok=True)
@@ -90,17 +91,15 @@ def _digest(path: Path) -> str:
 
 
 def _code(held: Any) -> Iterator[str]:
-    """Texts anywhere in a table that may name a file which Python executes."""
+    """Texts anywhere in a table that may name a file which is executed."""
     match held:
-        case str() if _is_code(held):
+        case str() if held.endswith(tuple(all_suffixes())):
             yield held
         case Mapping():
-            for value in held.values():
+            for key, value in held.items():
+                if key == "library" and isinstance(value, str):
+                    yield value  # however it ends
                 yield from _code(value)
         case list() | tuple():
             for value in held:
                 yield from _code(value)
-
-
-def _is_code(name: str) -> bool:
-    return name.endswith(tuple(all_suffixes()))

@@ -32,7 +32,9 @@ def command(run: Path) -> None:
             name = "/".join(path.parts[-2:])
             found = digest(path.read_bytes())
             state = "as it was recorded"
-            if recorded.get(name) != found:
+            if name not in recorded:
+                state = "of which the run recorded nothing"
+            elif recorded[name] != found:
                 state = "NOT AS IT WAS RECORDED"
             say(f"{path}  sha256 {found[:16]}, {state}")
         advice = "Let the environment variable XDG_DATA_HOME name another folder."

@@ -22,7 +22,7 @@ from tactile_lab.scope import Stream
 from tactile_lab.store.folder import INPUTS, SCENE, RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.table import dumped
-from tactile_lab.trust import remember
+from tactile_lab.trust import code_named, remember
 
 PACKAGES = (
     "tactile-lab", "numpy", "scipy", "numba", "h5py", "hdf5plugin", "pyserial", "pyusb",
@@ -94,7 +94,7 @@ def keep_scene(folder: RunFolder, scene: Scene) -> None:
             ) from error
         folder.write_text(name, text)
     with suppress(OSError):  # `tactile-lab trust` says what prevents it
-        remember(copies)
+        remember(code_named(scene.to_dict(), folder.path))
 
 
 def temperature(scene: Scene, read_back: Settings) -> dict[str, object]:

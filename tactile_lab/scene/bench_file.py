@@ -49,6 +49,14 @@ def _located(name: str, info: ValidationInfo) -> str:
 Located = AfterValidator(_located)
 """Of a name that may be a file's: its path is relative to the bench file."""
 
+
+def _beside(library: str, info: ValidationInfo) -> str:
+    """A library beside the bench file; another name is the loader's to find."""
+    folder: Path | None = (info.context or {}).get("folder", Path())
+    path = folder / library if folder is not None else None
+    return str(path.resolve()) if path is not None and path.exists() else library
+
+
 SCHEMES = ("socket", "rfc2217", "spy", "hwgrep", "loop", "alt", "cp2110", "sim")
 """What stands before `://` of a port; all but the last are pyserial's."""
 
@@ -173,7 +181,8 @@ class ScopeSpec(SceneTable):
     Attributes:
         driver: "ps3000a" or "usbtmc", or path of a Python file with a `ScopeDriver`.
         dialect: for usbtmc, the row of the model.
-        library: path of the vendor's library; the usual places unless given.
+        library: path of the vendor's library, from the bench file, or a name that the
+            system finds; the usual places unless given.
         serial: serial number, where several are attached.
         allow_usb2: accept a USB 2 port.
         allow_usb_power: accept running without the power supply.
@@ -183,7 +192,7 @@ class ScopeSpec(SceneTable):
 
     driver: Annotated[ScopeDriverName, Located] = "ps3000a"
     dialect: Annotated[str, Located] | None = None
-    library: str | None = None
+    library: Annotated[str, AfterValidator(_beside)] | None = None
     serial: str | None = None
     allow_usb2: bool = False
     allow_usb_power: bool = False

@@ -399,6 +399,7 @@ def _placed(inline: dict[str, Any], folder: Path) -> dict[str, Any]:
             for key, name in values.items()
             if (key in ("dialect", "driver") and is_file(name))
             or (key == "calibration" and isinstance(name, str))
+            or (key == "library" and (folder / str(name)).exists())
         }
         placed[table] = {**values, **files}
     return placed

@@ -6,6 +6,7 @@ import shutil
 import pytest
 
 from tactile_lab.engine.execution import Execution
+from tactile_lab.errors import SceneError
 from tactile_lab.scene.load import load
 from tactile_lab.trust import known_file
 
@@ -110,3 +111,30 @@ def test_a_driver_named_by_the_bench_of_a_run_is_code_too(tactile_lab, tmp_path)
     answer = tactile_lab("plan", run / "scene.toml")
     assert answer.code == 2
     assert str(tmp_path / "coil.py") in answer.err
+
+
+@pytest.mark.parametrize("name", ["libps3000a.so", "libps3000a.so.2"])
+def test_the_library_of_a_scope_is_code_that_runs_here_make_known(
+    tmp_path, monkeypatch, name
+):
+    (tmp_path / name).write_bytes(b"of a vendor")
+    bench = tmp_path / "bench.toml"
+    bench.write_text(
+        'simulated = true\n[scope]\ndriver = "ps3000a"\n'
+        f'library = "{name}"\n'
+        '[[scope.channels]]\nsignal = "V_C1"\ninput = "A"\nrange = "2 V"\n'
+        '[coil]\n[magnet]\nr = "6 mm"\n'
+    )
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    asked = (
+        "record.sample_rate=10 kS/s",
+        "protocol.duration=100 ms",
+        'record.signals=["V_C1"]',
+    )
+    scene = load("monitor", asked, bench=bench)
+    assert scene.bench.scope.library == str(tmp_path / name)
+    run = Execution(scene, tmp_path / "runs").run().folder
+    assert load(run / "scene.toml").bench.scope == scene.bench.scope
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "another computer's"))
+    with pytest.raises(SceneError, match=name):
+        load(run / "scene.toml")
