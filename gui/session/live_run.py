@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,7 +58,8 @@ class LiveRun(LiveTask):
         out: folder for run folders.
         waiting: notes that were typed before the next run; it will have them.
         reports: whether the report is written at its end.
-        reporting: folders whose report is being written.
+        reporting: folders whose report is being written, which is that of the first, or
+            waits for it: each takes up to a quarter of a GB, and most of a core.
         publish: whether the next runs are published by Lab Streaming Layer.
     """
 
@@ -89,7 +91,8 @@ class LiveRun(LiveTask):
         self.notes: dict[str, str] = {}
         self.waiting: list[str] = []
         self.reports = True
-        self.reporting: set[Path] = set()
+        self.reporting: dict[Path, Callable[[], None]] = {}
+        """And what follows once it is there."""
         self._outdated: set[Path] = set()
         self.publish = False
 
@@ -255,23 +258,36 @@ class LiveRun(LiveTask):
         elif (folder / "report.html").exists():
             self._write_report(folder, lambda: None)
 
+    def hasten(self) -> None:
+        """Have the reports that wait written all at once: the window goes."""
+        for folder in [*self.reporting][1:]:
+            self._link.ask(lambda reply: None, write_report, folder)
+
     def _write_report(self, folder: Path, then: Callable[[], None]) -> None:
         """Have a report written; again, if it was outdated meanwhile."""
+        self.reporting[folder] = then
+        if len(self.reporting) == 1:
+            self._write_next()
 
-        def told(reply: Reply[None]) -> None:
-            self.reporting.discard(folder)
-            if reply.problem:
-                self._log.add(Severity.WARNING, "report", reply.problem)
-            else:
-                words = f"Report in {folder / 'report.html'}"
-                self._log.add(Severity.GOOD, "report", words)
-            then()
-            if folder in self._outdated:
-                self._outdated.discard(folder)
-                self.renew_report(folder)
+    def _write_next(self) -> None:
+        folder = next(iter(self.reporting), None)
+        if folder is not None:
+            told = partial(self._written, folder)
+            self._link.ask(told, write_report, folder)
 
-        self.reporting.add(folder)
-        self._link.ask(told, write_report, folder)
+    def _written(self, folder: Path, reply: Reply[None]) -> None:
+        then = self.reporting.pop(folder)
+        self._write_next()
+        if reply.problem:
+            self._log.add(Severity.WARNING, "report", reply.problem)
+        else:
+            self._log.add(
+                Severity.GOOD, "report", f"Report in {folder / 'report.html'}"
+            )
+        then()
+        if folder in self._outdated:
+            self._outdated.discard(folder)
+            self.renew_report(folder)
 
     def _follow(self, folder: Path) -> None:
         """Have what the lab wants done after a run done."""

@@ -284,6 +284,7 @@ class Session(QObject):
 
     def close(self) -> None:
         """Let go of the engine; nothing drives a coil any more."""
+        self.run.hasten()
         self.link.close()
         self.desk.close()
 

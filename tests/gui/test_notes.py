@@ -1,7 +1,10 @@
 """Notes: where they go, where they are seen, and how they are changed."""
 
+import os
 import shutil
+import sys
 
+import pytest
 from PySide6.QtCore import QFile, Qt
 from PySide6.QtTest import QTest
 
@@ -95,6 +98,26 @@ def test_a_report_is_written_again_for_what_is_noted_after_it(lab) -> None:
         assert said in report.read_text()
     lab.session.run.reported.disconnect(told.append)
     assert not told, "a check that is judged now is none of an old run's report"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell")
+def test_one_report_is_written_at_a_time(lab, tmp_path, monkeypatch) -> None:
+    told, writer = tmp_path / "told", tmp_path / "writer"
+    writer.write_text(
+        f"#!/bin/sh\necho begun >> {told}\nsleep 0.05\necho done >> {told}"
+    )
+    writer.chmod(0o700)
+    monkeypatch.setattr(sys, "executable", str(writer))
+    run, there = lab.session.run, []
+    run.reports = True
+    run.reported.connect(there.append)
+    for name in "abc":
+        run.report(tmp_path / name)
+    run.reports = False
+    lab.until(lambda: len(there) == 3)
+    run.reported.disconnect(there.append)
+    assert [folder.name for folder in there] == [*"abc"]
+    assert told.read_text().split() == ["begun", "done"] * 3, "a quarter of a GB each"
 
 
 def test_name_tags_and_notes_are_edited_on_the_card(lab) -> None:
