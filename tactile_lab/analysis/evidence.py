@@ -94,7 +94,7 @@ class Residuals:
 
     def driven(self, x: FloatArray, parts: Mapping[str, float]) -> DrivenCircuit:
         """Circuit and force at scaled parameters `x`, by parts of the causes' bands."""
-        mine = {name: part for name, part in parts.items() if name in self.causes}
+        mine = {name: parts[name] for name in self.causes if name in parts}
         if self._moved is None:
             return DrivenCircuit(self.circuit(x), self.force)
         return self._moved(self.circuit(x), mine)

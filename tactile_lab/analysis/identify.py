@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
+from threadpoolctl import threadpool_limits
 
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.evidence import (
@@ -147,6 +148,12 @@ def identify_together(
             f"{problem.size} data points cannot determine {len(problem.names)} "
             "parameters" + "".join(f" ({why})" for why in unused)
         )
+    with threadpool_limits(1, "blas"):  # more of them wait longer than they work
+        found = _fitted(problem)
+    return replace(found, warnings=(*unused, *found.warnings))
+
+
+def _fitted(problem: JointResiduals) -> Identified:
     x = _nearby(problem)
     for _ in range(ROUNDS):  # the scatter of either kind is itself estimated
         slope, residual = _slope(problem, x), problem.residual(x)
@@ -154,8 +161,7 @@ def identify_together(
             weights = problem.weights(residual)
             x = x - _fit(slope * weights[:, np.newaxis], residual * weights)
             residual = problem.residual(x)
-    found = _identified(problem, x, weights)
-    return replace(found, warnings=(*unused, *found.warnings))
+    return _identified(problem, x, weights)
 
 
 def _check(circuit: Circuit, names: Sequence[str]) -> None:

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from tactile_lab.analysis.evidence import Residuals, Scatter
 from tactile_lab.analysis.identify import Evidence, identify, identify_together
@@ -240,3 +241,24 @@ def test_steps_of_the_force_between_two_spikes_move_no_estimate():
     seen = Residuals(true, ("V_GS",), stairs, 2.5, None, made.spike_times)
     assert made.spike_times[0] < steps[-1, 0], "it fires while the force still rises"
     assert np.abs(seen.under(DrivenCircuit(true, stairs))).max() < 1e-6
+
+
+def blas_threads():
+    return {
+        lib["num_threads"] for lib in threadpool_info() if lib["user_api"] == "blas"
+    }
+
+
+def test_a_fit_takes_one_thread_of_the_linear_algebra_and_gives_the_others_back():
+    """Two took 18 times as long as one with 600 ramps whose answers were late."""
+    seen = []
+
+    def moved(circuit, parts):
+        seen.append(blas_threads())
+        return DrivenCircuit(circuit, FORCE)
+
+    trace, _ = run_of(Circuit(), bins=50)
+    with threadpool_limits(2, "blas"):
+        identify(Circuit(), ("V_GS",), FORCE, FORCE.end, V_C1=trace, moved=moved)
+        assert blas_threads() == {2}
+    assert seen and set.union(*seen) == {1}
