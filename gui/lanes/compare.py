@@ -156,7 +156,7 @@ class Comparison(Source):
 
         Runs of the same length end a little apart, when shifted.
         """
-        ends = [m.source.reach + m.shift for m in self.members]
+        ends = [m.source.ends(lane.key) + m.shift for m in self.members]
         return min([view.end, *(e for e in ends if e > view.end - 0.1 * view.width)])
 
 

@@ -93,6 +93,15 @@ class LiveSource(Source):
         """Time up to which samples have come, s."""
         return self._streamed if self._pyramids else self.reach
 
+    def ends(self, key: str) -> float:
+        """Time up to which there is data of a lane, s."""
+        if key == "force":
+            return self.reach
+        if key in self._slow and key not in self._pyramids:
+            return self._slow[key].end
+        end = self.sampled_until
+        return min(end, self.followed) if key == "residual" else end
+
     @property
     def length(self) -> float:
         """Expected length, or the reach where that is longer, s."""

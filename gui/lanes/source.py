@@ -162,15 +162,17 @@ class Source:
         """Time up to which there are samples; all there is where there are none, s."""
         return self.reach
 
-    def right_edge(self, view: TimeView, lane: Lane) -> float:
-        """Where a lane is read on the right: at the view's end, or that of data, s.
+    def ends(self, key: str) -> float:
+        """Time up to which there is data of a lane, s; 0 where there is none.
 
-        What is measured is read where samples end, if that is in view: a coil may be
-        late to go to 0 A. The force goes on: it is heard of when a scope no longer is.
+        Instruments end at times of their own, and a coil may be late to go to 0 A.
         """
-        edge, end = min(view.end, self.reach), self.sampled_until
-        measured = lane.key != "force" and view.start < end < edge
-        return end if measured else edge
+        return self.reach
+
+    def right_edge(self, view: TimeView, lane: Lane) -> float:
+        """Where a lane is read on the right: at the view's end, or its own, s."""
+        edge, end = min(view.end, self.reach), self.ends(lane.key)
+        return end if view.start < end < edge else edge
 
 
 @dataclass(frozen=True, eq=False)

@@ -170,6 +170,13 @@ class RunSource(Source):
         """Where the first of the signals ends."""
         return min((one.end for one in self._pyramids.values()), default=self.reach)
 
+    def ends(self, key: str) -> float:
+        """Time up to which there is data of a lane, s."""
+        if key in self._lines and key not in self._pyramids:
+            return self._lines[key].end
+        end = self.sampled_until
+        return min(end, self.model.end) if self.model and key == "residual" else end
+
     def take_fetched(self) -> bool:
         """Whether samples have arrived since this was last asked."""
         arrived = self.fetched.is_set()

@@ -17,9 +17,11 @@ from gui.lanes.readings import (
 )
 from gui.lanes.view import TimeView
 from gui.look.theme import Theme
+from tactile_lab.engine.events import ModelPart
 from tactile_lab.trace import HOLDS, Trace
 
-LANES = {lane.key: lane for lane in lanes_for({"force", "V_C1", "spikes"})}
+READ = {"force", "V_C1", "spikes", "field", "temperature"}
+LANES = {lane.key: lane for lane in lanes_for(READ)}
 
 
 def test_value_of_a_trace_is_between_its_points_and_nothing_in_a_gap() -> None:
@@ -152,6 +154,31 @@ def test_force_is_read_where_its_lane_ends_though_the_scope_was_unplugged() -> N
     assert _right(source, "force") == 0.12e3, "the run goes on: it is behind the coil"
     source.running = False
     assert (_right(source, "force"), _right(source, "V_C1")) == (0.0, 1.25)
+
+
+def test_what_a_meter_reads_is_read_where_its_own_lane_ends() -> None:
+    """Not where samples end: a teslameter goes on as the scope is unplugged."""
+    source = LiveSource(None, 0.12)
+    flat = np.full(3000, 1.25)
+    bins = Trace.bins(np.arange(3000) * 1e-3, flat, flat, flat, 1e-3)
+    source.add_bins({"V_C1": bins})
+    source.add_current(6.0, 0.0)
+    for time, tesla, kelvin in ((2.0, 0.2, 295.0), (5.0, 0.1, 296.0)):
+        source.add_field(time, tesla)
+        source.add_reading("temperature", time, kelvin)
+    source.running = False
+    assert (_right(source, "field"), _right(source, "temperature")) == (100.0, 296.0)
+
+
+def test_a_residual_is_read_where_the_model_has_come_to() -> None:
+    source = LiveSource(None, 0.12)
+    flat = np.full(3000, 1.25)
+    bins = Trace.bins(np.arange(3000) * 1e-3, flat, flat, flat, 1e-3)
+    source.add_bins({"V_C1": bins})
+    model = bins[:2800]
+    source.model.add(ModelPart({"V_C1": model}, np.empty(0), model.end))
+    source.running = False
+    assert _right(source, "residual") == 0.0, "it said —"
 
 
 def _right(source: LiveSource, key: str) -> float | None:
