@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from pathlib import Path
 
 import numpy as np
 
@@ -31,6 +32,7 @@ class LiveSource(Source):
     Args:
         preview: the model's expectation; None until it is known.
         newtons_per_ampere: turns coil current into force.
+        folder: it is recorded to; None where nothing is kept.
 
     Attributes:
         model: the twin beside the run, as far as it has come.
@@ -41,8 +43,15 @@ class LiveSource(Source):
     holds: list[Stretch] = []  # noqa: RUF012
     notes: list[tuple[float, str]] = []  # noqa: RUF012
 
-    def __init__(self, preview: Preview | None, newtons_per_ampere: float) -> None:
-        self.preview = preview
+    folder: Path | None = None
+
+    def __init__(
+        self,
+        preview: Preview | None,
+        newtons_per_ampere: float,
+        folder: Path | None = None,
+    ) -> None:
+        self.preview, self.folder = preview, folder
         self.aligned = None if preview is None else Aligned(preview)
         self.model = TwinTraces()
         self.holds, self.notes = [], []

@@ -43,6 +43,11 @@ class Source:
         return self
 
     @property
+    def folder(self) -> Path | None:
+        """Of the run it is of, be it in progress; None where nothing is kept."""
+        return self.path
+
+    @property
     def has_model(self) -> bool:
         """Whether a model is beside the data."""
         return False

@@ -251,15 +251,18 @@ class Centre(QWidget):
 
     def _show_step(self, time: float, run: Path | None) -> None:
         """Show the step that a time of a run is in, or that time itself."""
-        shown = self.stack.source.members[0].source.path
-        if run is not None and shown is not None and shown != run:
+        seen = self.stack.source.members
+        of = next((one for one in seen if run in (None, one.source.folder)), None)
+        if of is None:
+            assert run is not None, "a line of no run is of what is shown"
             self.say(f"{run.name} is not on screen; open it in Runs.")
             return
-        for one in reversed(self.stack.source.holds):
+        for one in reversed(of.source.holds):
             if one.start - LATER <= time < one.end:
-                self.view.show_step(one.start, one.end - one.start)
+                self.view.show_step(one.start + of.shift, one.end - one.start)
                 return
-        self.view.show_span(time - self.view.width / 2, self.view.width)
+        middle = time + of.shift
+        self.view.show_span(middle - self.view.width / 2, self.view.width)
 
     def say(self, problem: str) -> None:
         """Say something above the lanes; "" takes it away."""

@@ -307,7 +307,7 @@ class LiveRun(LiveTask):
         coil.limits = event.limits or coil.limits
         coil.sign_of_life()
         preview = plan.preview if plan else None
-        self.source = LiveSource(preview, event.newtons_per_ampere)
+        self.source = LiveSource(preview, event.newtons_per_ampere, event.folder)
         for warning in plan.warnings if plan else ():
             self._log.add(Severity.WARNING, "plan", warning)
         self.begun.emit(self.source)

@@ -6,6 +6,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
+from gui.lanes.live import LiveSource
 from gui.session.steps import of_run
 from gui.state import WindowState
 
@@ -76,6 +77,14 @@ def test_a_line_of_the_log_on_a_step_shows_it(lab) -> None:
     log.table.activated.emit(line)
     assert (view.start, view.end) == seen, "the step of another run"
     assert folder.name in window.centre.notice.text()
+    live = LiveSource(None, 1.0, other)
+    window.centre.stack.show_source(live)
+    log.table.activated.emit(line)
+    assert (view.start, view.end) == seen, "a time of the run in progress"
+    live.folder = folder
+    live.begin_trial(1, steps[1])
+    log.table.activated.emit(line)
+    assert shows(view, steps[1]), "that of the run in progress itself"
 
 
 def test_a_run_that_ended_tells_the_times_of_its_record(lab) -> None:
