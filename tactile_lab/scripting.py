@@ -285,14 +285,11 @@ def design(what: str | Path | Mapping[str, Any]) -> Chosen:
     return choose(load_specification(what))
 
 
-def runs(
-    out: str | Path = "runs", *, protocol: str | None = None, where: str = ""
-) -> list[RunSummary]:
+def runs(out: str | Path = "runs", *, where: str = "") -> list[RunSummary]:
     """The runs in a folder, oldest first; each entry's `load()` opens its run.
 
     Args:
         out: holds run folders.
-        protocol: only runs of this protocol.
         where: a condition, such as "protocol.levels > 100 mN and tag = cal"
             (docs/how-to/find-and-compare-runs.md).
 
@@ -301,19 +298,24 @@ def runs(
         SceneError: `where` cannot be read.
     """
     with Catalogue(Path(out)) as found:
-        return found.runs(protocol=protocol, where=where)
+        return found.runs(where=where)
 
 
-def latest(out: str | Path = "runs", *, protocol: str | None = None) -> Run:
+def latest(out: str | Path = "runs", *, where: str = "") -> Run:
     """The newest run in a folder that can be read.
+
+    Args:
+        out: holds run folders.
+        where: a condition as `runs` takes it, such as "protocol = hold".
 
     Raises:
         RunFolderError: there is no such folder, or no such run in it.
+        SceneError: `where` cannot be read.
     """
-    for entry in reversed(runs(out, protocol=protocol)):
+    for entry in reversed(runs(out, where=where)):
         try:
             return entry.load()
         except RunFolderError:
             continue  # it ended before its first sample
-    what = "run" if protocol is None else f"run of {protocol}"
+    what = f"run with {where}" if where else "run"
     raise RunFolderError(f"{Path(out).resolve()} holds no {what} that can be read.")

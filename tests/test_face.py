@@ -173,8 +173,8 @@ def test_the_latest_run_is_found_and_runs_are_listed(run, tmp_path):
     out = run.path.parent
     assert tactile_lab.latest(out).path == run.path
     assert [entry.load().path for entry in tactile_lab.runs(out)] == [run.path]
-    with pytest.raises(RunFolderError, match="no run of hold"):
-        tactile_lab.latest(out, protocol="hold")
+    with pytest.raises(RunFolderError, match="no run with protocol = hold"):
+        tactile_lab.latest(out, where="protocol = hold")
     with pytest.raises(RunFolderError, match="no run that can be read"):
         tactile_lab.latest(tmp_path)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactile_lab.commands.attended import Signals, interrupted
+from tactile_lab.commands.attended import Signals
 from tactile_lab.commands.one_run import (
     answer,
     concluded,
@@ -45,11 +45,6 @@ if TYPE_CHECKING:
 @runs_option
 @notes_option
 @click.option(
-    "--temperature",
-    metavar="VALUE",
-    help='Of the room, kept with the run, such as "23.5 °C"; see [conditions].',
-)
-@click.option(
     "--transcript",
     "transcripts",
     type=click.Path(path_type=Path, file_okay=False),
@@ -68,20 +63,6 @@ if TYPE_CHECKING:
     metavar="FILE",
     help="What a manual teslameter showed at each hold, one a line, mT or with unit.",
 )
-@click.option(
-    "--sweep",
-    "sweeps",
-    multiple=True,
-    metavar="KEY=FROM:TO:STEP",
-    help="Run it at each value, as a study: --sweep 'protocol.hold=1 s:3 s:1 s'.",
-)
-@click.option(
-    "--repeat",
-    type=click.IntRange(min=1),
-    default=1,
-    metavar="N",
-    help="Run it N times at each value, as a study.",
-)
 @status_option
 @live_option
 @click.option("--no-report", is_flag=True, help="Leave out figure and report.")
@@ -93,12 +74,9 @@ def command(
     realtime: bool,
     out: Path,
     notes: tuple[str, ...],
-    temperature: str | None,
     transcripts: Path | None,
     again: Path | None,
     field: Path | None,
-    sweeps: tuple[str, ...],
-    repeat: int,
     status: str | None,
     live: str | None,
     no_report: bool,
@@ -113,23 +91,7 @@ def command(
     began = time.monotonic()
     with Signals() as signals, ExitStack() as served:
         with refusing():
-            if temperature is not None:
-                overrides = (*overrides, f"conditions.temperature={temperature}")
             loaded = _scene(scene, overrides, bench, again)
-            if sweeps or repeat > 1:
-                given = {
-                    "--realtime": realtime,
-                    "--note": notes,
-                    "--transcript": transcripts,
-                    "--again": again,
-                    "--field": field,
-                    "--status": status,
-                    "--live": live,
-                }
-                _refuse_with_sweep([name for name, value in given.items() if value])
-                with interrupted():
-                    _sweep(loaded, sweeps, repeat, out, as_json=as_json)
-                return
             signals.look()
             execution, watchers = prepared(
                 loaded,
@@ -157,26 +119,6 @@ def command(
 
         concluded(done, no_report=no_report, tell=tell)
     raise click.exceptions.Exit(done.exit_code)
-
-
-def _refuse_with_sweep(options: list[str]) -> None:
-    from tactile_lab.errors import SceneError
-
-    if options:
-        raise SceneError(
-            f"{' and '.join(options)} cannot go with --sweep or --repeat: that is a "
-            "study (`tactile-lab study --help`). Leave it out, or run once."
-        )
-
-
-def _sweep(
-    scene: Scene, sweeps: tuple[str, ...], repeat: int, out: Path, *, as_json: bool
-) -> None:
-    """Run `scene` at each value, `repeat` times, with its runs kept below `out`."""
-    from tactile_lab.commands.study import carry_out_attended
-    from tactile_lab.studies.study import short
-
-    carry_out_attended(short(scene, sweeps, repeat), out, as_json=as_json)
 
 
 def record(bench: Bench, folder: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import sys
 from collections.abc import Collection, Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,15 +20,9 @@ if TYPE_CHECKING:
 
     Known = dict[str, list[Fact]]
 
-DAY = click.DateTime(["%Y-%m-%d"])
-
 
 @click.command()
 @click.argument("root", default=runs_folder, type=click.Path(path_type=Path))
-@click.option("--protocol", metavar="NAME", help="Only runs of this protocol.")
-@click.option("--sensor", metavar="TEXT", help="Only runs whose noted sensor has this.")
-@click.option("--since", type=DAY, metavar="DATE", help="Not before this day.")
-@click.option("--until", type=DAY, metavar="DATE", help="Not after this day.")
 @click.option(
     "--search", default="", metavar="WORDS",
     help="Only runs with these words in names, notes, tags or parameters.",
@@ -53,10 +46,6 @@ DAY = click.DateTime(["%Y-%m-%d"])
 @json_option
 def command(
     root: Path,
-    protocol: str | None,
-    sensor: str | None,
-    since: datetime | None,
-    until: datetime | None,
     search: str,
     where: str,
     sort: str | None,
@@ -67,20 +56,14 @@ def command(
     """List the runs in folder ROOT (./runs, or as lab.toml says), oldest first.
 
     CONDITION is KEY SIGN VALUE, joined by and, or, not and brackets; signs are
-    = != > >= < <= and ~ (contains). Values may have units.
+    = != > >= < <= and ~ (contains). Values may have units: 'sensor = S12 and
+    started >= 2026-11-01'.
     """
     with refusing():
         from tactile_lab.store.catalogue import Catalogue
 
         with Catalogue(root) as found:
-            entries = found.runs(
-                protocol=protocol,
-                sensor=sensor,
-                since=since.date() if since else None,
-                until=until.date() if until else None,
-                words=search,
-                where=where,
-            )
+            entries = found.runs(words=search, where=where)
             key = sort.removeprefix("-") if sort else None
             if key is not None:
                 _check_key(key, found.keys())

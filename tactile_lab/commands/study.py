@@ -75,16 +75,16 @@ def command(
             else:
                 _print_plan(asked, cost)
             return
-        carry_out_attended(asked, out, workers, scheduler, as_json=as_json)
+        _carry_out(asked, out, workers, scheduler, as_json=as_json)
 
 
-def carry_out_attended(
+def _carry_out(
     study: Study,
     out: Path,
-    workers: int | None = None,
-    scheduler: str | None = None,
+    workers: int | None,
+    scheduler: str | None,
     *,
-    as_json: bool = False,
+    as_json: bool,
 ) -> None:
     """Carry a study out, telling how far it is, and print what it says.
 

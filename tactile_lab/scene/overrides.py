@@ -69,14 +69,14 @@ def _changes(overrides: Overrides) -> Iterable[tuple[list[str], Any, str]]:
         return
     for text in overrides:
         key, equals, written = str(text).partition("=")
-        yield _path(key) if equals else [], from_text(written.strip()), f"--set {text}"
+        yield _path(key) if equals else [], _from_text(written.strip()), f"--set {text}"
 
 
 def _path(key: str) -> list[str]:
     return [part.strip() for part in key.split(".")]
 
 
-def from_text(text: str) -> Any:
+def _from_text(text: str) -> Any:
     """A value as ``--set`` takes it: TOML where it reads as TOML, else a text."""
     try:
         parsed = tomllib.loads(f"value = {text}")

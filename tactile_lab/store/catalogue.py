@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from datetime import date, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
 
@@ -58,45 +58,17 @@ class Catalogue:
     def __exit__(self, *error: object) -> None:
         self._index.close()
 
-    def runs(
-        self,
-        *,
-        protocol: str | None = None,
-        sensor: str | None = None,
-        since: date | None = None,
-        until: date | None = None,
-        words: str = "",
-        where: str = "",
-    ) -> list[RunSummary]:
+    def runs(self, *, words: str = "", where: str = "") -> list[RunSummary]:
         """Runs that match, oldest first.
 
         Args:
-            protocol: name of the protocol.
-            sensor: part of the noted sensor, any case.
-            since: first day on which the run started.
-            until: last day.
             words: each stands somewhere in its names, notes or parameters.
             where: a condition on keys, see `where`.
 
         Raises:
             SceneError: `where` cannot be read.
         """
-        chosen = []
-        for entry in self._fitting(where):
-            day = (
-                datetime.fromisoformat(entry.started).date() if entry.started else None
-            )
-            if protocol is not None and entry.protocol != protocol:
-                continue
-            if sensor is not None and sensor.casefold() not in entry.sensor.casefold():
-                continue
-            if since is not None and (day is None or day < since):
-                continue
-            if until is not None and (day is None or day > until):
-                continue
-            if not entry.says(words):
-                continue
-            chosen.append(entry)
+        chosen = [entry for entry in self._fitting(where) if entry.says(words)]
         return sorted(chosen, key=lambda entry: (entry.started, entry.name))
 
     def keys(self) -> list[str]:

@@ -17,7 +17,6 @@ from tactile_lab.errors import QuantityError, SceneError, choices, nearest
 from tactile_lab.plugins import study_names, study_path
 from tactile_lab.quantity import parse, show
 from tactile_lab.scene.load import load, read_toml, tuples
-from tactile_lab.scene.overrides import from_text
 from tactile_lab.scene.scene import Scene
 from tactile_lab.studies.axes import axis, changed
 from tactile_lab.studies.design import Design, Method, checked
@@ -293,37 +292,3 @@ def _check(study: Study) -> None:
     for one in study.design.axes:  # each key alone, so that the message names it
         first = one.values[0] if one.values else one.spread and one.spread.centre
         load(study.scene, changed([one], [first]))
-
-
-def short(scene: Scene, sweeps: tuple[str, ...], repeat: int) -> Study:
-    """The study that ``run --sweep KEY=VALUES --repeat N`` asks for.
-
-    Raises:
-        SceneError: a sweep cannot be read.
-    """
-    axes = []
-    for text in sweeps:
-        key, equals, values = text.partition("=")
-        if not (equals and values.strip()):
-            raise SceneError(
-                f'--sweep "{text}": write KEY=FROM:TO:STEP, such as '
-                'protocol.hold="1 s:3 s:0.5 s", or KEY=VALUE,VALUE.'
-            )
-        ranged = values.count(":") == 2
-        listed = values if ranged else [from_text(v.strip()) for v in values.split(",")]
-        axes.append(axis(key.strip(), {"values": listed}, scene))
-    on: On = "simulated" if scene.bench.simulated else "bench"
-    study = Study(
-        name=f"{scene.name}_sweep",
-        title=f"{scene.name}: {', '.join(one.key for one in axes) or 'repeats'}",
-        scene=scene,
-        on=on,
-        design=checked(Design(axes=tuple(axes), repeat=repeat)),
-        kept=kept(ALWAYS, Path.cwd(), on),
-        require={},
-        order="random",
-        keeps_runs=on == "bench",
-        source={"scene": scene.name, "sweep": list(sweeps), "repeat": repeat},
-    )
-    _check(study)
-    return study

@@ -79,7 +79,8 @@ def test_a_report_is_left_with_the_run(finished):
 
 def test_a_run_is_repeated_from_its_own_folder(finished, tactile_lab, tmp_path):
     options = ["--again", only_run(finished[0]), "--out", tmp_path]
-    answer = tactile_lab("run", *options, "--temperature", "23.5 °C", "--no-report")
+    warmer = "conditions.temperature=23.5 °C"
+    answer = tactile_lab("run", *options, "--set", warmer, "--no-report")
     assert answer.code == 0, answer.err
     assert "results: the same" in answer.out
     assert "temperature.K was None, is 296.65" in answer.out

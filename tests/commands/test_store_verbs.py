@@ -44,9 +44,9 @@ def test_runs_lists_and_filters(run):
     assert listed.exit_code == 0
     assert run.name in listed.output
     assert "0 of 10,000 samples" in listed.output
-    found = json.loads(tell("runs", run.parent, "--sensor", "S12", "--json").stdout)
+    found = json.loads(tell("runs", run.parent, "--search", "s12", "--json").stdout)
     assert [entry["name"] for entry in found["runs"]] == [run.name]
-    none = tell("runs", run.parent, "--protocol", "hold")
+    none = tell("runs", run.parent, "--search", "hold")
     assert none.exit_code == 0
     assert run.name not in none.output
 

@@ -36,20 +36,23 @@ def root(tmp_path):
 
 def test_filters(root):
     assert len(catalogue(root)) == 3
-    assert [e.sensor for e in catalogue(root, protocol="pulses")] == ["S12", "S7"]
-    assert len(catalogue(root, sensor="s12")) == 2
+    pulses = catalogue(root, where="protocol = pulses")
+    assert [e.sensor for e in pulses] == ["S12", "S7"]
+    assert len(catalogue(root, where="sensor ~ s12")) == 2
     today = date.today()
-    assert len(catalogue(root, since=today - timedelta(1), until=today)) == 3
-    assert catalogue(root, since=today + timedelta(1)) == []
-    assert catalogue(root, until=today - timedelta(2)) == []
+    yesterday, tomorrow = today - timedelta(1), today + timedelta(1)
+    days = f"started >= {yesterday} and started < {tomorrow + timedelta(1)}"
+    assert len(catalogue(root, where=days)) == 3
+    assert catalogue(root, where=f"started >= {tomorrow + timedelta(1)}") == []
+    assert catalogue(root, where=f"started < {yesterday}") == []
 
 
 def test_index_follows_what_changes(root):
     catalogue(root)
-    entry = catalogue(root, sensor="S7")[0]
+    entry = catalogue(root, where="sensor = S7")[0]
     path = root / entry.name
     write_json(path / "run.json", {**read_info(path), "spikes_online": 1234})
-    assert catalogue(root, sensor="S7")[0].spikes == 1234
+    assert catalogue(root, where="sensor = S7")[0].spikes == 1234
 
 
 @pytest.mark.parametrize("rubbish", [b"", b"{", b"SQLite format 3\0" + bytes(99)])

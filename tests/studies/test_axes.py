@@ -17,6 +17,8 @@ def test_a_range_takes_the_unit_of_its_key_and_includes_its_end() -> None:
     found = axis("sensor.V_GS", {"values": "1.38 V : 1.42 V : 10 mV"}, SCENE)
     assert found.unit == "V"
     assert found.values == pytest.approx((1.38, 1.39, 1.40, 1.41, 1.42), abs=1e-15)
+    found = axis("protocol.levels", {"values": "180 mN:200 mN:20 mN"}, SCENE)
+    assert (found.unit, found.values) == ("N", (0.18, 0.2)), "each a list of one"
 
 
 def test_a_tolerance_is_of_what_the_scene_has() -> None:

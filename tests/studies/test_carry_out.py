@@ -177,6 +177,8 @@ def test_the_run_of_a_point_is_kept_and_found_again(tmp_path: Path) -> None:
     for one in (plain, kept):
         found, _ = done(one, tmp_path, count=2)
         write_page(found, tmp_path / one.name)
+    page = (tmp_path / "kept" / "report.html").read_text(encoding="utf-8")
+    assert "Simulated bench" in page and "response to sensor.V_GS" in page
     seen, none = look_at(tmp_path / "kept"), look_at(tmp_path / "plain")
     for number, count in enumerate(found.numbers()["spike_count"]):
         folder = seen.run_of(number)
