@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 
 import numpy as np
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -96,6 +96,9 @@ class ResultsView(QWidget):
         self.plot = SmallPlot(theme)
         self.trains = SmallPlot(theme)
         self.trains.hide()
+        self._later = QTimer(self)  # both plots in one turn are a late frame
+        self._later.setSingleShot(True)
+        self._later.timeout.connect(self._show_trains)
         self.loop = SmallPlot(theme)
         self.loop.hide()
         self.answers: list[SmallPlot] = []
@@ -217,7 +220,11 @@ class ResultsView(QWidget):
         else:
             shown = column_plot(self._steps, y, x)
         self.plot.show_plot(shown)
+        self._later.start()
+
+    def _show_trains(self) -> None:
         self.trains.show_plot(train_plot(self._steps, self._laws))
+        self._arrange()
 
     @property
     def _nothing(self) -> str:
