@@ -13,10 +13,13 @@ from gui.look.theme import Theme
 from gui.parts import Elided, column, label, row
 from gui.state import Snapshot, WindowState, minutes
 
+CUT = ("Cut", "Broke")
+"""First words of how a run ended that nobody completed on disk."""
+
 ENDS = {
     "Complete": "green",
     "Aborted": "amber",
-    **dict.fromkeys(("Faulted", "Cut", "Broke"), "red"),
+    **dict.fromkeys(("Faulted", *CUT), "red"),
 }
 """Colour of a run that is over, by the first word of how it ended."""
 
@@ -133,8 +136,10 @@ class ProgressStrip(QWidget):
         else:
             colour = ENDS.get(ending.partition(" ")[0], colour)
             self._say(ending or "No run yet")
+            # how much of a run that was cut is on disk is told once it is recovered
+            word = "seen" if ending.partition(" ")[0] in CUT else "kept"
             shown = ending and kept
-            self._right.setText(f"{reach:.1f} s kept" if shown else "")
+            self._right.setText(f"{reach:.1f} s {word}" if shown else "")
         self.blocks.show_steps(list(holds), length, reach, colour)
         self.setAccessibleName(self.text)
 

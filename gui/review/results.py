@@ -130,7 +130,7 @@ class ResultsView(QWidget):
         self._facts_text = label("", "", wrap=True)
         column(self._facts, self._facts_text, margin=10)
         self._facts.hide()
-        self.report = push("Open report")
+        self.report = push("")
         self.report.hide()
         self.report.clicked.connect(self.report_asked)
         self._set_up_table()
@@ -275,11 +275,16 @@ class ResultsView(QWidget):
         y, x = self.drawn.currentText(), self.against.currentText()
         return f"{'Rate' if y == 'rates' else y.capitalize()} against {x}"
 
-    def show_facts(self, text: str, *, report: bool) -> None:
-        """Show statements on the whole run, and whether there is a report."""
+    def show_facts(self, text: str) -> None:
+        """Show statements on the whole run."""
         self._facts_text.setText(text)
         self._facts.setVisible(bool(text))
-        self.report.setVisible(report)
+
+    def show_report(self, offer: str, *, ready: bool = True) -> None:
+        """Show what can be done about the report, if it can be by now; "": nothing."""
+        self.report.setText(offer)
+        self.report.setVisible(bool(offer))
+        self.report.setEnabled(ready)
 
     def _fill(self, steps: Sequence[MeasuredTrial], rows: int) -> None:
         table, told = self.table, [cells(step) for step in steps]

@@ -19,11 +19,14 @@ from tactile_lab.acquisition.events import RunState
 from tactile_lab.engine.engine import Reply
 from tactile_lab.errors import RunFolderError
 from tactile_lab.measurement import MeasuredTrial
+from tactile_lab.store.folder import DATA
 from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:
     from gui.lanes.stored import RunSource
     from tactile_lab.acquisition.ending import Executed
+
+REPORT = "report.html"
 
 
 class RunResults(QObject):
@@ -55,7 +58,7 @@ class RunResults(QObject):
         self._whole = False
         self._elsewhere = False
         self._total = 0
-        self._desk = session.desk
+        self._desk, self._run = session.desk, session.run
         self._asked = 0
         self._fits = False
         self._next: tuple[tuple[MeasuredTrial, ...], FitInput] | None = None
@@ -100,13 +103,14 @@ class RunResults(QObject):
             done.off.text.partition(" | ")[0],
             "" if bare else loss_text(done.loss),
         ]
-        self._view.show_facts("<br>".join(filter(None, facts)), report=False)
+        self._view.show_facts("<br>".join(filter(None, facts)))
+        self._offer_report()
 
     def reported(self, folder: Path, source: Source | None) -> None:
         """The run's report is written, and the model has come to the end."""
         if folder == self.folder:
             self._fit(source)
-            self._view.report.setVisible((folder / "report.html").exists())
+            self._offer_report()
             self._conclude(folder)
 
     def stored(self, source: RunSource) -> None:
@@ -119,10 +123,10 @@ class RunResults(QObject):
         self._show_fit(None)  # those of the run before
         self._fit(source)
         self._view.show_loop(source.loop)
-        report = (source.path / "report.html").exists()
-        self._view.show_facts(facts_of(source), report=report)
+        self._view.show_facts(facts_of(source))
         self._view.show_statements(())
-        if report:
+        self._offer_report()
+        if (source.path / REPORT).exists():
             self._conclude(source.path)
 
     def recorded(self, source: RunSource) -> None:
@@ -154,7 +158,8 @@ class RunResults(QObject):
         self._elsewhere = False
         self._total = steps
         self._view.show_kind(fires=fires)
-        self._view.show_facts("", report=False)
+        self._view.show_facts("")
+        self._offer_report()
         self._view.show_statements(())
         self._show(running=running)
         self._fit(None)
@@ -191,10 +196,27 @@ class RunResults(QObject):
             self._show_fit(reply.value)
         self._fit_next()
 
-    def open_report(self) -> None:
-        """Open the report of the run on screen in the browser."""
-        if self.folder is not None:
-            self._open(self.folder / "report.html")
+    def ask_report(self) -> None:
+        """Open the report of the run on screen in the browser; write a missing one."""
+        if self.folder is None:
+            return
+        if (self.folder / REPORT).exists():
+            self._open(self.folder / REPORT)
+        else:
+            self._run.write_report(self.folder)
+            self._offer_report()
+
+    def _offer_report(self) -> None:
+        """Say whether the run on screen has a report, and offer what can be done."""
+        folder = self.folder
+        if folder is None or not (folder / DATA).exists():
+            self._view.show_report("")
+        elif (folder / REPORT).exists():
+            self._view.show_report("Open report")
+        elif folder in self._run.reporting:
+            self._view.show_report("Writing the report …", ready=False)
+        else:
+            self._view.show_report("Write report")
 
     def open_folder(self, out: Path) -> None:
         """Open the folder of the run on screen, else that of all runs."""

@@ -82,7 +82,7 @@ class Screen(QObject):
         runs.compared.connect(records.compare)
         panels.centre.compare_bar.closed.connect(self.close_run)
         self.results.unopened.connect(self.say)
-        panels.review.results.report_asked.connect(self.results.open_report)
+        panels.review.results.report_asked.connect(self.results.ask_report)
         panels.review.export.clicked.connect(
             lambda: self.results.open_folder(panels.session.out)
         )

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from gui.session.expectation import Expectation
     from gui.session.fit import Agreement
 
+AGAIN = "Open it in Runs: Write report, in Results, makes one that is missing."
 LEVELS = {"info": Severity.INFO, "warning": Severity.WARNING, "error": Severity.ERROR}
 
 
@@ -237,16 +238,23 @@ class LiveRun(LiveTask):
             folder: of the run.
             follow: then do what the lab has follow each run.
         """
+        then = partial(self._follow, folder) if follow else None
+        if self.reports:
+            self.write_report(folder, then)
+        elif then is not None:
+            then()
+
+    def write_report(
+        self, folder: Path, then: Callable[[], None] | None = None
+    ) -> None:
+        """Have a report written, as `reported` tells, and do what comes `then`."""
 
         def written() -> None:
             self.reported.emit(folder)
-            if follow:
-                self._follow(folder)
+            if then is not None:
+                then()
 
-        if self.reports:
-            self._write_report(folder, written)
-        elif follow:
-            self._follow(folder)
+        self._write_report(folder, written)
 
     def renew_report(self, folder: Path) -> None:
         """Have a report that is there written again: more was said of its run.
@@ -279,7 +287,9 @@ class LiveRun(LiveTask):
         then = self.reporting.pop(folder)
         self._write_next()
         if reply.problem:
-            self._log.add(Severity.WARNING, "report", reply.problem)
+            problem = reply.problem.removesuffix(".")
+            words = f"No new report of {folder.name}: {problem}. {AGAIN}"
+            self._log.add(Severity.WARNING, "report", words)
         else:
             self._log.add(
                 Severity.GOOD, "report", f"Report in {folder / 'report.html'}"

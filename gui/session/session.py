@@ -314,7 +314,9 @@ class Session(QObject):
         self.log.add(level, "safety", text, safety=True)
 
     def _engine_lost(self, why: str) -> None:
-        self.log.add(Severity.ERROR, "engine", f"The engine ended: {why}")
+        text = f"The process that drives the instruments has ended: {why}. "
+        again = "Another is started when it is needed."
+        self.log.add(Severity.ERROR, "engine", text + again)
 
     def _desk_lost(self, why: str) -> None:
         text = f"Fits and the model beside runs were interrupted: {why}"

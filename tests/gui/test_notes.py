@@ -120,6 +120,32 @@ def test_one_report_is_written_at_a_time(lab, tmp_path, monkeypatch) -> None:
     assert told.read_text().split() == ["begun", "done"] * 3, "a quarter of a GB each"
 
 
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell")
+def test_a_missing_report_is_written_where_it_is_looked_for(
+    lab, tmp_path, monkeypatch
+) -> None:
+    """As that of a run whose engine died meanwhile; only the log told."""
+    window, folder = lab.window, lab.folder / "unreported"
+    shutil.copytree(lab.runs(1)[0], folder)
+    window.screen_.open_run(folder)
+    lab.until(lambda: lab.session.opened == (folder.name,))
+    button, writer = window.review.results.report, tmp_path / "writer"
+    monkeypatch.setattr(sys, "executable", str(writer))
+    for writes, then in (
+        ("echo no room >&2; exit 3", "Write report"),
+        ('echo well > "$4/report.html"', "Open report"),
+    ):
+        writer.write_text(f"#!/bin/sh\n{writes}")
+        writer.chmod(0o700)
+        assert button.text() == "Write report" and button.isEnabled()
+        button.click()
+        assert "Writing" in button.text() and not button.isEnabled()
+        lab.until(button.isEnabled)
+        assert button.text() == then
+    (failed,) = (one.text for one in lab.session.log.lines if "no room" in one.text)
+    assert folder.name in failed and "Write report, in Results" in failed
+
+
 def test_name_tags_and_notes_are_edited_on_the_card(lab) -> None:
     window, folder = lab.window, lab.runs(1)[0]
     card = window.runs.card

@@ -120,3 +120,13 @@ def test_a_run_that_is_over_has_the_colour_of_its_end(app, ending, colour) -> No
     told = f"{ending} · some run" if ending else ""
     strip.show_run(snapshot, [], 1.0, 1.0, None, told)
     assert strip.blocks._colour == colour
+    assert ("1.0 s kept" in strip.text) is bool(ending)
+
+
+@pytest.mark.parametrize("ending", ["Cut short", "Broke"])
+def test_of_a_run_that_was_cut_it_is_not_said_how_much_was_kept(app, ending) -> None:
+    """What was seen live is not all on disk: up to 0.2 s more."""
+    strip = ProgressStrip(Theme("light"))
+    snapshot = Snapshot(state=WindowState.READY)
+    strip.show_run(snapshot, [], 1.0, 1.0, None, f"{ending} · some run")
+    assert "1.0 s seen" in strip.text and "kept" not in strip.text

@@ -57,8 +57,6 @@ def test_card_of_a_stored_run_has_what_is_at_the_right_edge(lab) -> None:
     window.screen_.open_run(folder)
     lab.until(lambda: window.session.opened == (folder.name,))
     said = window.centre.notice
-    window.review.results.report_asked.emit()
-    assert said.text() == f"There is no report.html in {folder}."
     window.review.export.click()  # this screen has no desktop behind it
     assert said.text() == f"No program of this computer opens it; it is at {folder}."
     run, stack, view = window.screen_.run, window.centre.stack, window.centre.view
