@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -12,6 +13,7 @@ from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QPainter, QPen
 
 from gui.lanes import paint
+from gui.lanes.across import Across, draw_across
 from gui.lanes.compare import MARKS
 from gui.lanes.floor import AXIS, GUTTER, LaneContext, row_names, rows_of
 from gui.lanes.lane import BAND, Lane
@@ -220,13 +222,14 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         on = Drawing(painter, frame, stage.source, stage.tokens)
         with paint.clipped(painter, QRectF(0, -5, wide, tall + 9)):
             painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+            across = [*self._levels(on.tokens)]
             if len(runs) > 1:
                 self._runs(on, runs)
             else:
                 self._beyond(on)
                 self._traces(on, runs[0], self._twin)
-                self._threshold(on)
-            self._levels(on)
+                across += self._threshold(on.source.threshold, on.tokens)
+            draw_across(painter, frame, across, on.tokens.plot)
         if len(runs) == 1:
             self._tag(on)
 
@@ -255,36 +258,26 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         view, (low, high) = self._stage.view, self.shown
         return Frame(0.0, width, 0.0, self.height(), view.start, view.end, low, high)
 
-    def _levels(self, on: Drawing) -> None:
+    def _levels(self, tokens: Tokens) -> Iterator[Across]:
         """The lines across, with their values and what lies between the two."""
-        painter, frame, tokens = on.painter, on.frame, on.tokens
-        places = max(self.lane.places, decimals((frame.high - frame.low) / 200))
+        low, high = self.shown
+        places = max(self.lane.places, decimals((high - low) / 200))
         for number_, level in enumerate(self.levels):
-            y = round(frame.y1(level)) + 0.5
-            painter.setPen(paint.pen(tokens.accent, Qt.PenStyle.DashLine))
-            painter.drawLine(QPointF(0, y), QPointF(frame.right, y))
             words = f"{number(level, places)} {self.lane.unit}"
             if number_:
                 words += f"  Δ {signed(level - self.levels[0], places)}"
-            above = y - 8 if y > 18 else y + 9
-            at = QPointF(frame.right - 5, above)
-            paint.write(painter, at, words, tokens.accent, align=1.0)
+            yield Across(level, words, tokens.accent, Qt.PenStyle.DashLine, right=True)
 
-    def _threshold(self, on: Drawing) -> None:
+    def _threshold(self, level: float | None, tokens: Tokens) -> Iterator[Across]:
         """The level at which spikes were counted, and where a hand drags it to."""
-        level, frame, tokens = on.source.threshold, on.frame, on.tokens
         if level is None or self.lane.key != "V_K":
             return
-        for value, ink, words in (
-            (level, tokens.muted, f"threshold {number(level, 2)} V"),
-            (self.wanted, tokens.accent, f"next {number(self.wanted or 0.0, 2)} V"),
-        ):
-            if value is None:
-                continue
-            y = round(frame.y1(value)) + 0.5
-            on.painter.setPen(paint.pen(ink, Qt.PenStyle.DotLine))
-            on.painter.drawLine(QPointF(0, y), QPointF(frame.right, y))
-            paint.write_on(on.painter, QPointF(5, y - 8), words, ink, tokens.plot)
+        dots = Qt.PenStyle.DotLine
+        words = f"threshold {number(level, 2)} V"
+        yield Across(level, words, tokens.muted, dots, right=False)
+        if self.wanted is not None:
+            words = f"next {number(self.wanted, 2)} V"
+            yield Across(self.wanted, words, tokens.accent, dots, right=False)
 
     def _beyond(self, on: Drawing) -> None:
         """Shade where the input left its range: the trace is a limit there."""

@@ -1,6 +1,6 @@
 """The lanes under the pointer: values, time, cursors, zoom."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ from PySide6.QtCore import QPoint, QPointF, QRect
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from gui.lanes.across import places
 from gui.lanes.box import heights_of
 from gui.lanes.expected import Stretch
 from gui.lanes.floor import AXIS, cursor_times, grounds, round_times
@@ -83,6 +84,16 @@ def test_no_round_time_stands_half_below_that_of_a_cursor(app, a, b):
     ]
     assert len(times) > 5 and 3 <= len(whole) < len(times)
     assert all(not left <= x <= right for x in whole for left, right in seen)
+
+
+@pytest.mark.parametrize("tall", [20.0, 34.0, 90.0])
+def test_words_of_lines_across_lie_in_the_lane_and_over_no_others(tall):
+    high, widths = 16, (40.0, 110.0)
+    for a, b in product(np.linspace(0.5, tall - 0.5, 9), repeat=2):
+        one, other = places([a, b], widths, tall)
+        assert abs(one[1] - other[1]) >= high or other[0] > one[0] + widths[0]
+        for _, at in (one, other):
+            assert -4 <= at - high / 2 and at + high / 2 <= tall + 5
 
 
 def test_a_name_that_is_cut_off_shows_that_it_is(app) -> None:
