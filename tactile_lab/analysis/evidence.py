@@ -70,6 +70,8 @@ class Residuals:
         times = np.empty(0) if spike_times is None else np.asarray(spike_times)
         short = np.diff(times) <= LONGEST
         self._earlier, self._later = times[:-1][short], times[1:][short]
+        pairs = zip(self._earlier, self._later, strict=True)
+        self._straight = [_grid(a, b) for a, b in pairs]
         self.bins = 0 if V_C1 is None else int(V_C1.time.size)
         self.offset = 0.0 if V_C1 is None else math.hypot(V_C1.resolution, V_C1.offset)
         self.size = self.bins + self._earlier.size
@@ -106,13 +108,19 @@ class Residuals:
         if self._trace is not None:
             parts.append(self._trace.value - self._trace.modelled(found))
         if self._later.size:
-            grids = [
-                _grid(force.time, a, b)
-                for a, b in zip(self._earlier, self._later, strict=True)
-            ]
+            grids = self._between(force.time)
             current = _charging(circuit, found, np.concatenate(grids))
             parts.append(_at_firing(circuit, grids, current))
         return np.concatenate(parts) if parts else np.empty(0)
+
+    def _between(self, bends: FloatArray) -> list[FloatArray]:
+        """Ends and middles of steps from spike to spike that none of `bends` parts."""
+        first = np.searchsorted(bends, self._earlier, side="right")
+        last = np.searchsorted(bends, self._later)
+        return [
+            grid if i >= j else _grid(grid[0], grid[-1], bends[i:j])
+            for grid, i, j in zip(self._straight, first, last, strict=True)
+        ]
 
     def late(self, driven: DrivenCircuit) -> FloatArray:
         """What of V_C2 at firing a late spike changes, V/s, shape (pairs, 2).
@@ -337,14 +345,13 @@ def _at_firing(
     return misses
 
 
-def _grid(bends: FloatArray, start: float, end: float) -> FloatArray:
-    """Ends and middles of steps from `start` to `end` s that none of `bends` parts.
+def _grid(start: float, end: float, bends: FloatArray | None = None) -> FloatArray:
+    """Ends and middles of steps from `start` to `end` s; one ends at each of `bends`.
 
     I_C bends where the force does, which a step across that would miss.
     """
-    inside = bends[(bends > start) & (bends < end)]
     even = np.linspace(start, end, max(4, math.ceil((end - start) / (2 * STEP))) + 1)
-    ends = np.unique(np.concatenate([even, inside]))
+    ends = even if bends is None else np.union1d(even, bends)
     return np.insert(ends, np.arange(1, ends.size), (ends[1:] + ends[:-1]) / 2)
 
 
