@@ -171,11 +171,13 @@ class RunSource(Source):
         return min((one.end for one in self._pyramids.values()), default=self.reach)
 
     def ends(self, key: str) -> float:
-        """Time up to which there is data of a lane, s."""
-        if key in self._lines and key not in self._pyramids:
-            return self._lines[key].end
+        """Time up to which there is data of a lane, s; the last bins reach beyond."""
         end = self.sampled_until
-        return min(end, self.model.end) if self.model and key == "residual" else end
+        if key in self._lines and key not in self._pyramids:
+            end = self._lines[key].end
+        elif self.model and key == "residual":
+            end = min(end, self.model.end)
+        return min(end, self.reach)
 
     def take_fetched(self) -> bool:
         """Whether samples have arrived since this was last asked."""
