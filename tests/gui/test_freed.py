@@ -4,6 +4,7 @@ What only Python's collector frees ends late, and without `gui.garbage` in any t
 """
 
 import gc
+import weakref
 from collections import Counter
 from collections.abc import Callable
 
@@ -102,6 +103,21 @@ def test_a_run_that_waited_leaves_nothing_to_the_collector(app) -> None:
 
     wait()
     assert not in_circles(wait)
+
+
+def test_what_runs_leave_in_circles_is_collected_once_one_has_ended(lab) -> None:
+    """It stayed for two minutes or more: 50 MB of far ends in ten minutes of runs."""
+
+    class Circle:
+        def __init__(self) -> None:
+            self.own = self
+
+    left = weakref.ref(circle := Circle())
+    gc.collect()  # it is old now
+    del circle
+    lab.run()
+    lab.session.stop()
+    lab.until(lambda: left() is None)
 
 
 def test_another_protocol_in_the_form_leaves_nothing_to_the_collector(lab) -> None:
