@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +28,7 @@ from gui.setup.parameter import FieldError
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import RecordingError, TactileLabError
 from tactile_lab.trace import Trace
-from tactile_lab.whole_file import replacing, write_text
+from tactile_lab.whole_file import failing_as, replacing, write_text
 
 if TYPE_CHECKING:
     from gui.screen.panels import Panels
@@ -53,14 +54,8 @@ def save_scene(panels: Panels) -> None:
 
 def write_scene(panels: Panels, path: Path) -> None:
     """Write the form as a scene."""
-    try:
+    with _telling(panels, "scene", path):
         write_text(path, panels.setup.request().load().to_toml())
-    except (TactileLabError, FieldError, OSError) as error:
-        panels.session.log.add(
-            Severity.ERROR, "scene", f"{path} was not saved: {error}"
-        )
-    else:
-        panels.session.log.add(Severity.GOOD, "scene", f"Saved {path}")
 
 
 def export_view(panels: Panels, screen: Screen) -> None:
@@ -86,21 +81,33 @@ def write_view(panels: Panels, run: Source | None, path: Path) -> None:
     if run is not None and bar.comparison is run:
         title += f", {bar.comparison.layout.value}"
     title += " · SIMULATED" if simulated else " · measured"
+    with _telling(panels, "export", path), replacing(path) as part:
+        ending = path.suffix.lower()
+        if ending == ".csv":
+            part.write_bytes(table(stack, title).encode())
+        elif ending == ".svg":
+            part.write_bytes(_svg(stack, title))
+        elif not picture(stack, title).save(str(part)):
+            raise RecordingError(
+                "no picture can be written there. End it in .png, or "
+                "choose another folder or disk."
+            )
+
+
+@contextmanager
+def _telling(panels: Panels, source: str, path: Path) -> Iterator[None]:
+    """Say in the log whether a file was saved, and above the lanes that it was not."""
     try:
-        with replacing(path) as part:
-            ending = path.suffix.lower()
-            if ending == ".csv":
-                part.write_bytes(table(stack, title).encode())
-            elif ending == ".svg":
-                part.write_bytes(_svg(stack, title))
-            elif not picture(stack, title).save(str(part)):
-                raise OSError(f"{path} cannot be written as a picture; end it in .png.")
-    except (RecordingError, OSError) as error:
-        panels.session.log.add(
-            Severity.ERROR, "export", f"The view was not exported: {error}"
-        )
+        with failing_as(f"{path} was not saved", "Choose another folder or disk."):
+            yield
+    except (TactileLabError, FieldError) as error:
+        why = str(error)
+        said = why if str(path) in why else f"{path} was not saved: {why}"
+        panels.session.log.add(Severity.ERROR, source, said)
+        panels.centre.say(said)
     else:
-        panels.session.log.add(Severity.GOOD, "export", f"View exported to {path}")
+        panels.session.log.add(Severity.GOOD, source, f"Saved {path}")
+        panels.centre.say("")
 
 
 def picture(stack: LaneStack, title: str, scale: int = 2) -> QImage:

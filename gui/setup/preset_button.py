@@ -15,7 +15,8 @@ from gui.setup.form import Form
 from gui.setup.parameter import FieldError, text_of
 from gui.setup.presets import parameters, presets, save_preset
 from tactile_lab.engine.request import Request
-from tactile_lab.errors import TactileLabError
+from tactile_lab.errors import SceneError, TactileLabError
+from tactile_lab.whole_file import failing_as
 
 
 class PresetButton(IconButton):
@@ -101,7 +102,11 @@ class PresetButton(IconButton):
         self.save(self.name.text())
 
     def _delete(self, file: Path) -> None:
-        file.unlink(missing_ok=True)
+        try:
+            with failing_as(f"The preset {file} was not deleted", kind=SceneError):
+                file.unlink(missing_ok=True)
+        except SceneError as error:
+            self.failed.emit(str(error))
         self.mark()
 
     def _presets(self) -> dict[str, Path]:
@@ -110,7 +115,8 @@ class PresetButton(IconButton):
 
     def _texts(self, file: Path) -> dict[str, str]:
         """A preset as it stands in the form's fields."""
-        changed = file.stat().st_mtime_ns
+        with failing_as(f"The preset {file} cannot be read", kind=SceneError):
+            changed = file.stat().st_mtime_ns
         if self._read.get(file, (0, {}))[0] != changed:
             self._read[file] = (changed, parameters(file))
         values = self._read[file][1]

@@ -1,5 +1,6 @@
 """Presets: parameters kept under a name, as scenes that run by themselves."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -55,4 +56,12 @@ def test_unusable_preset_is_told_and_not_taken_up(lab) -> None:
     setup.star.use(file)
     assert setup.form.texts() == before and "hold" in setup.problem.text()
     file.unlink()
+    setup.plan_now()
+    setup.star.use(file)  # its menu was open as somebody deleted it
+    assert f"The preset {file} cannot be read" in setup.problem.text()
+    file.mkdir()
+    (file / "inside").touch()
+    setup.star._delete(file)
+    assert f"The preset {file} was not deleted" in setup.problem.text()
+    shutil.rmtree(file)
     setup.plan_now()

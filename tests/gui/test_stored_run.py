@@ -124,9 +124,17 @@ def test_view_is_exported(lab) -> None:
     assert QSvgRenderer(str(folder / "view.svg")).isValid()
     before = {file: file.read_bytes() for file in folder.glob("view.*")}
     write_scene(window.panels, folder / "saved.toml")
+    notice = window.centre.notice
+    write_view(window.panels, None, folder / "view.what")
+    assert f"{folder / 'view.what'} was not saved" in notice.text()
+    assert "End it in .png" in notice.text()
     for file in before:
-        write_view(window.panels, None, file / "in a file.png")
-        assert "not exported" in window.session.log.lines[-1].text
+        inside = file / "in a file.png"
+        write_view(window.panels, None, inside)
+        assert f"{inside} was not saved" in window.session.log.lines[-1].text
+        assert notice.text() == window.session.log.lines[-1].text
+        write_scene(window.panels, folder / "saved.toml")
+        assert not notice.isVisible()
         with full_after(50):
             write_view(window.panels, None, file)
             write_scene(window.panels, folder / "saved.toml")
