@@ -54,6 +54,19 @@ def omega(z: float) -> float:
 
 
 @inner
+def omega_near(z: float, w: float) -> float:
+    """Omega of z from w, which is near it: one iteration where that is enough."""
+    if z <= 20.0 or not 0.5 * z < w < z:
+        return omega(z)
+    r = z - w - math.log(w)
+    if abs(r) > NEAR:
+        return omega(z)
+    one = 1.0 + w
+    a = one * (one + 2.0 / 3.0 * r)
+    return w * (1.0 + r * (a - 0.5 * r) / (one * (a - r)))
+
+
+@inner
 def Q_at(y: float, par: FloatArray) -> float:
     """R_L (I_C + I_bias) at V_C1 = y, Eq. (17), V."""
     U = par[V_S] - y

@@ -35,13 +35,14 @@ from tactile_lab.model.truncation import carried, longer, missing, unseen
 MOST_ITERATIONS = 10
 COLUMNS = 3
 """Right-hand sides: the correction, and the effect of either voltage at the start."""
-LENGTH, UNITS, Y_END, V_END, LEFT_1, LEFT_2, STAYS_1, STAYS_2, GROWTH = range(9)
+LENGTH, UNITS, Y_END, V_END, LEFT_1, LEFT_2, STAYS_1, STAYS_2, GROWTH, TERMS = range(10)
 """A step: its length, s, and in units of the fastest rate; both voltages at its end, V;
-what they are wrong by within it and at its end, V; how much longer the next may be."""
-MOVED = 9
+what they are wrong by within it and at its end, V; how much longer the next may be;
+of how many terms B's series is, where it is a power series."""
+MOVED = 10
 """From here on, what a volt at the start moves at the end: V_C1 by V_C1, by V_C2, V_C2
 by V_C1, by V_C2."""
-STEP = 13
+STEP = 14
 """Numbers of a step."""
 series_room = room_for(ORDER + 1)
 
@@ -70,7 +71,16 @@ def flow(
 
     While the firing stage conducts (`held`), it keeps T1's collector at V_reset.
     """
-    currents(y, par[V_RESET] if held else v, par, f)
+    flow_near(B, y, v, 0.0, held, par, f)
+
+
+@inner
+def flow_near(
+    B: float, y: float, v: float, near: float, held: bool, par: FloatArray,
+    f: FloatArray,
+) -> None:  # fmt: skip
+    """`flow`, where T1's omega is `near` a value that is known."""
+    currents(y, par[V_RESET] if held else v, near, par, f)
     x = -y / par[V_T]
     if x < -1.0:
         q = math.exp(x)
@@ -276,10 +286,17 @@ def first_crossing(
     doubt = False
     while u < 1.0:
         top = u + width if u + width < 1.0 else 1.0
-        for i in range(ORDER + 1):
-            x = 2.0 * (u + (top - u) * POINTS[i]) - 1.0
-            part[i] = (a[0] - level) + series_at(a, ORDER, x)
-        to_series(part, d)
+        if width == 1.0:
+            for n in range(ORDER + 1):
+                d[n] = a[n]
+            d[0] -= level
+            part[0] = d[0] + series_at(d, ORDER, -1.0)
+            part[ORDER] = d[0] + series_at(d, ORDER, 1.0)
+        else:
+            for i in range(ORDER + 1):
+                x = 2.0 * (u + (top - u) * POINTS[i]) - 1.0
+                part[i] = (a[0] - level) + series_at(a, ORDER, x)
+            to_series(part, d)
         size = steep = 0.0
         for n in range(1, ORDER + 1):
             size += abs(d[n])
@@ -288,7 +305,7 @@ def first_crossing(
         if d[0] + size >= -error:
             if steep < abs(d[1]):
                 if d[1] > 0.0 and part[ORDER] >= 0.0:
-                    return crossing(a, level, u, top), doubt
+                    return crossing(a, level, u, top, 1e-3 * error), doubt
                 if d[1] < 0.0 and part[0] >= -error:
                     doubt = True
             elif size > error and width > 1e-12:

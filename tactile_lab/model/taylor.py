@@ -26,10 +26,11 @@ from tactile_lab.model.pair import (
     MOVED,
     STAYS_1,
     STAYS_2,
+    TERMS,
     UNITS,
     V_END,
     Y_END,
-    flow,
+    flow_near,
     with_node_a,
 )
 from tactile_lab.model.tableau import ORDER, POINTS
@@ -39,7 +40,6 @@ from tactile_lab.model.transistor import (
     C2_BY_1,
     C2_BY_2,
     I_S1,
-    OF_B,
     OF_Q,
     OF_W,
     OF_X,
@@ -63,6 +63,8 @@ Y, V, TO_Y, TO_V, G, B, Q, P, APART, W, LOG = range(11)
 exp(-V_C1/V_T) - 1; 1 + J/I_T1s and the slope of its logarithm, (V_C2 - V_C1)/V_T;
 omega or, with "direct", I_F + I_T1s, and the slope of its logarithm."""
 ROWS = 11
+ROUNDING = 1e-17
+"""A term below this share of the first is nothing."""
 NOTHING = 1e-20
 """A junction's exponential below this is left out: the rest of its series is, too."""
 
@@ -109,13 +111,19 @@ def fastest(f: FloatArray) -> float:
 def expand_B(
     V_P: float, p: float, unit: float, degree: int, par: FloatArray, c: FloatArray
 ) -> int:
-    """Fill the rows G and B from B's first; returns the last that is not nothing."""
+    """Fill the rows G and B from B's first; returns how many are not rounding."""
     c[G, 0] = unit * (p - V_P / par[TAU])
-    least, leak = 1e-20 * c[B, 0], -unit / par[TAU]
+    leak, far = -unit / par[TAU], longest(degree)
+    # what matters at the end of the longest step
+    least = far * ROUNDING * c[B, 0]
     for k in range(degree):
-        c[B, k + 1] = par[PER_VOLT] * product(c, G, B, k) * PER[k]
+        total = 0.0
+        for j in range(k + 1):
+            total += c[G, j] * c[B, k - j]
+        c[B, k + 1] = par[PER_VOLT] * total * PER[k]
         c[G, k + 1] = leak * c[G, k] * PER[k]
-        if max(abs(c[B, k]), abs(c[B, k + 1])) <= least:
+        least /= far
+        if max(abs(c[B, k]), far * abs(c[B, k + 1])) <= least:
             for j in range(k, degree + 1):
                 c[B, j] = 0.0
             return k
@@ -145,10 +153,15 @@ def slopes_known(c: FloatArray, k: int) -> tuple[float, float]:
 def expand(
     s: float, y: float, v: float, held: bool, V0: float, p: float, unit: float,
     degree: int, par: FloatArray, f: FloatArray, c: FloatArray,
-) -> None:  # fmt: skip
-    """Fill the rows of `c` at s after the segment's start, where `flow` is f."""
-    c[B, 0], c[Q, 0] = f[OF_B], f[OF_Q]
-    few = expand_B(V_P_at(s, V0, p, par[TAU]), p, unit, degree, par, c)
+) -> int:  # fmt: skip
+    """Fill the rows of `c` at s after the segment's start, where `flow` is f.
+
+    Returns how many coefficients of B are more than rounding.
+    """
+    # B anew: at the end of a step before, its series had it, to rounding each time
+    V_P = V_P_at(s, V0, p, par[TAU])
+    c[B, 0], c[Q, 0] = B_at(V_P, par), f[OF_Q]
+    few = expand_B(V_P, p, unit, degree, par, c)
     v_t, leak, direct = par[V_T], par[I_S1], par[DIRECT] != 0.0
     per_t = 1.0 / v_t
     open_1 = 1.0 + c[Q, 0] > NOTHING
@@ -197,23 +210,50 @@ def expand(
     c[TO_Y, degree] = c[TO_V, degree] = 0.0
     for n in range(ROWS):
         c[n, degree + 1] = 0.0
+    return few
 
 
 @inner
-def four_at(
-    c: FloatArray, one: int, two: int, three: int, four: int, degree: int, x: float
-) -> tuple[float, float, float, float]:
-    """Four of the series at x units: even and odd terms apart, none waits for long."""
+def B_of(c: FloatArray, few: int, x: float) -> float:
+    """B's series at x units, of which the terms from `few` on are rounding."""
+    total = 0.0
+    for k in range(few - 1, -1, -1):
+        total = total * x + c[B, k]
+    return total
+
+
+@inner
+def two_at(
+    c: FloatArray, one: int, two: int, degree: int, x: float
+) -> tuple[float, float]:
+    """Two of the series at x units: even and odd terms apart, none waits for long."""
     top, square = degree - degree % 2, x * x
-    a, b, p, q = c[one, top], c[two, top], c[three, top], c[four, top]
-    top += 1
-    odd_a, odd_b, odd_p, odd_q = c[one, top], c[two, top], c[three, top], c[four, top]
-    for k in range(top - 3, -1, -2):
+    a, odd_a = c[one, top], c[one, top + 1]
+    b, odd_b = c[two, top], c[two, top + 1]
+    for k in range(top - 2, -1, -2):
         a, odd_a = a * square + c[one, k], odd_a * square + c[one, k + 1]
         b, odd_b = b * square + c[two, k], odd_b * square + c[two, k + 1]
-        p, odd_p = p * square + c[three, k], odd_p * square + c[three, k + 1]
-        q, odd_q = q * square + c[four, k], odd_q * square + c[four, k + 1]
-    return a + x * odd_a, b + x * odd_b, p + x * odd_p, q + x * odd_q
+    return a + x * odd_a, b + x * odd_b
+
+
+@inner
+def ends_at(
+    c: FloatArray, degree: int, x: float
+) -> tuple[float, float, float, float, float]:
+    """V_C1, V_C2, their slopes and W after x units, as `two_at` has them."""
+    top, square = degree - degree % 2, x * x
+    a, odd_a = c[Y, top], c[Y, top + 1]
+    b, odd_b = c[V, top], c[V, top + 1]
+    p, odd_p = c[TO_Y, top], c[TO_Y, top + 1]
+    q, odd_q = c[TO_V, top], c[TO_V, top + 1]
+    w, odd_w = c[W, top], c[W, top + 1]
+    for k in range(top - 2, -1, -2):
+        a, odd_a = a * square + c[Y, k], odd_a * square + c[Y, k + 1]
+        b, odd_b = b * square + c[V, k], odd_b * square + c[V, k + 1]
+        p, odd_p = p * square + c[TO_Y, k], odd_p * square + c[TO_Y, k + 1]
+        q, odd_q = q * square + c[TO_V, k], odd_q * square + c[TO_V, k + 1]
+        w, odd_w = w * square + c[W, k], odd_w * square + c[W, k + 1]
+    return a + x * odd_a, b + x * odd_b, p + x * odd_p, q + x * odd_q, w + x * odd_w
 
 
 @inner
@@ -229,10 +269,12 @@ def reached(c: FloatArray, degree: int, wanted: float) -> float:
 @inner
 def highest(row: FloatArray, degree: int, x: float) -> float:
     """What the series does not exceed up to x units."""
-    total = abs(row[degree])
-    for k in range(degree - 1, 0, -1):
-        total = total * x + abs(row[k])
-    return float(row[0] + total * x)
+    top, square = degree - degree % 2, x * x
+    even, odd = abs(row[top]), abs(row[top + 1])
+    for k in range(top - 2, 0, -2):
+        even = even * square + abs(row[k])
+        odd = odd * square + abs(row[k + 1])
+    return float(row[0] + (even * x + odd * square + abs(row[1])) * x)
 
 
 @inner
@@ -322,9 +364,14 @@ def end_at(
 
     Returns the slopes of both series there, V per unit.
     """
-    y, v, to_y, to_v = four_at(c, Y, V, TO_Y, TO_V, degree, x)
+    y, v, to_y, to_v, near = ends_at(c, degree, x)
     step[Y_END], step[V_END] = y, v
-    flow(B_at(V_P_at(s + x * unit, V0, p, par[TAU]), par), y, v, held, par, g)
+    few = int(step[TERMS])
+    if few < degree:
+        B_end = B_of(c, few, x)
+    else:
+        B_end = B_at(V_P_at(s + x * unit, V0, p, par[TAU]), par)
+    flow_near(B_end, y, v, near, held, par, g)
     return to_y, to_v
 
 
@@ -337,7 +384,10 @@ def move(
 
     In the middle the series tell it.
     """
-    P_m, W_m, B_m, Q_m = four_at(c, P, W, B, Q, degree, 0.5 * x)
+    P_m, W_m = two_at(c, P, W, degree, 0.5 * x)
+    B_m, Q_m = c[B, 0], -1.0
+    if 1.0 + c[Q, 0] > NOTHING:
+        B_m, Q_m = two_at(c, B, Q, degree, 0.5 * x)
     of_junctions(P_m - 1.0, W_m, par, m)
     # of the Jacobian, not the slopes: it depends on no voltage but by these
     with_node_a(B_m, Q_m, 1.0 + Q_m, 0.0, 0.0, held, par, m)
@@ -357,7 +407,7 @@ def expanded(
     short enough.
     """
     unit = 1.0 / rate
-    expand(s, y, v, held, V0, p, unit, degree, par, f, c)
+    step[TERMS] = expand(s, y, v, held, V0, p, unit, degree, par, f, c)
     x = reached(c, degree, wanted)
     step[LENGTH] = (x if x > 0.1 else 0.1) * unit
     x = min(x, longest(degree), room * rate)

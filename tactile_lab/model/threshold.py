@@ -10,8 +10,13 @@ from tactile_lab.model.tableau import ORDER
 
 
 @inner
-def crossing(a: FloatArray, level: float, low: float, high: float) -> float:
-    """Where the series a, monotone on [low, high], passes `level` (Illinois' rule)."""
+def crossing(
+    a: FloatArray, level: float, low: float, high: float, enough: float
+) -> float:
+    """Where the series a, monotone on [low, high], passes `level` (Illinois' rule).
+
+    It misses the level there by `enough`, or by rounding if that is more.
+    """
     f_low = (a[0] - level) + series_at(a, ORDER, 2.0 * low - 1.0)
     f_high = (a[0] - level) + series_at(a, ORDER, 2.0 * high - 1.0)
     u, last = high, 0.0
@@ -20,7 +25,7 @@ def crossing(a: FloatArray, level: float, low: float, high: float) -> float:
             break
         u = low - f_low * (high - low) / (f_high - f_low)
         f = (a[0] - level) + series_at(a, ORDER, 2.0 * u - 1.0)
-        if abs(f) <= 1e-16 * abs(level):
+        if abs(f) <= enough:
             break
         # an end that stays twice counts for half of what it is
         half = 0.5 if f * last > 0.0 else 1.0
@@ -71,7 +76,7 @@ def above_threshold(
         if y0 < level:
             fires[1] = split
     else:
-        u = crossing(a, level, 0.0, split)
+        u = crossing(a, level, 0.0, split, 1e-16 * abs(level))
         if y0 < level:
             fires[1] = u
         else:
@@ -81,7 +86,7 @@ def above_threshold(
             if y1 < level:
                 fires[2] = split
         else:
-            u = crossing(a, level, split, 1.0)
+            u = crossing(a, level, split, 1.0, 1e-16 * abs(level))
             if y1 < level:
                 fires[2] = u
             else:

@@ -16,7 +16,7 @@ import math
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
-from tactile_lab.model.integrator import DIRECT, PARAMETERS, V_S, omega
+from tactile_lab.model.integrator import DIRECT, PARAMETERS, V_S, omega_near
 from tactile_lab.model.node_a import V_T
 
 I_S1, R_E, PER_F, PER_R, T1_C1, T1_C2, T1_BIAS, E_DROP, E_LOG, SATURATES = range(
@@ -62,15 +62,19 @@ def of_junctions(X: float, W: float, par: FloatArray, out: FloatArray) -> None:
 
 
 @inner
-def currents(y: float, v: float, par: FloatArray, out: FloatArray) -> None:
-    """Fill `out` at V_C1 = y, V_C2 = v with the junctions' state and `of_junctions`."""
+def currents(y: float, v: float, near: float, par: FloatArray, out: FloatArray) -> None:
+    """Fill `out` at V_C1 = y, V_C2 = v with the junctions' state and `of_junctions`.
+
+    `near` is what omega may be near, nothing if not known.
+    """
     X = math.expm1(min((v - y) / par[V_T], EXPONENT_CAP))
     U = par[V_S] - y
     if par[DIRECT] != 0.0:
         W = par[I_S1] * math.exp(min(U / par[V_T], 600.0))
     else:
         J = par[I_S1] * X
-        W = omega((U + par[R_E] * J + par[E_DROP]) / par[V_T] + par[E_LOG])
+        z = (U + par[R_E] * J + par[E_DROP]) / par[V_T] + par[E_LOG]
+        W = omega_near(z, near)
     of_junctions(X, W, par, out)
 
 

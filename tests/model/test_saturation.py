@@ -66,6 +66,13 @@ def test_a_stiff_step_grows():
     assert found.stages["V_C1"] < 200
 
 
+def test_a_long_step_under_a_rising_force_misses_rounding_alone():
+    rising = Waveform.through([(0, 0), (1, 0.1)])
+    found = simulate(SENSOR, rising, until=1.0, tolerance=1e-13)
+    assert found.stages["V_C1"] <= 15
+    assert found.error.V_C1 < 4e-14
+
+
 def spice_rows():
     with Path(__file__).with_name("saturation.csv").open() as file:
         return list(csv.DictReader(file))
