@@ -116,6 +116,12 @@ class Instruments:
         ]
 
     @property
+    def doubts(self) -> list[str]:
+        """What is to be said of readings that were not kept, one a line."""
+        meters = (one for one in (self.meter, self.thermometer) if one is not None)
+        return [one.doubt for one in meters if one.doubt]
+
+    @property
     def voltages_left(self) -> dict[str, RestReport]:
         """How the source of each voltage was left, once it is."""
         return {t.voltage: t.left for t in self.voltages if t.left is not None}

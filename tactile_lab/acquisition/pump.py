@@ -251,6 +251,6 @@ class Pump:
                 self._emit(events.Message("error", left.text))
 
     def _tell_changes(self) -> None:
-        """Say which settings are not as they were when the run began."""
-        for text in self._instruments.changes:
+        """Say which settings are not as they were, and which answers were not kept."""
+        for text in (*self._instruments.changes, *self._instruments.doubts):
             self._account.warn(text)

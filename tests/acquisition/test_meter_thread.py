@@ -52,6 +52,23 @@ def test_every_reading_is_taken_whenever_it_comes(latency, every):
     assert [reading.value for reading in taken] == list(range(1, meter.asked + 1))
 
 
+def test_an_answer_that_is_of_nobody_knows_which_moment_is_not_kept():
+    """A step of a field calibration had the field of the step before."""
+    clock = SimulatedClock()
+    meter = SlowMeter(clock, 0.02)
+    thread = MeterThread("field meter", meter, clock, 0.1)
+    with clock.taking_part("test"):
+        thread.start()
+        for meter.latency, until in ((0.02, 1.0), (0.9, 1.1), (0.02, 3.0)):
+            clock.sleep_until(until)
+        thread.leave()
+        clock.wait_for(lambda: thread.ended, clock.now() + 1.0)
+    seen = [round(one.value) for one in thread.take_readings()]
+    (missing,) = set(range(1, meter.asked + 1)) - set(seen)
+    assert 10 < missing < 13 and len(seen) > 15
+    assert thread.doubt.startswith("field meter: 1 answer took over 140 ms")
+
+
 def test_a_run_stores_every_reading_of_a_slow_meter(run_scene):
     asked = []
 
