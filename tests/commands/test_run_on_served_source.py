@@ -1,4 +1,4 @@
-"""`tactile-lab run` on a source served by another process, ended in every way."""
+"""`tactile-lab run` on a source that outlives it, ended in every way."""
 
 import json
 import os
@@ -6,11 +6,10 @@ import signal
 import subprocess
 import sys
 import time
-from importlib import resources
-from pathlib import Path
+from contextlib import closing
 
 import pytest
-from benches import SERVED
+from served_source import Source
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
 
@@ -26,80 +25,37 @@ PATIENCE = 60.0
 """Longest wait for what a busy machine does late, s."""
 
 
-class Served:
-    """A served source, what it was told, and a run on it."""
-
-    def __init__(self, folder: Path, where: str) -> None:
-        self.folder = folder
-        self.log = folder / "changes.jsonl"
-        self.process = subprocess.Popen(
-            [
-                *(sys.executable, "-m", "tactile_lab", "serve-bench", "--json"),
-                *("--coil", where, "--log", str(self.log)),
-            ],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        port = json.loads(self.process.stdout.readline())["coil"]
-        (folder / "scene.toml").write_text(SCENE)
-        row = resources.files("tactile_lab.instruments").joinpath(
-            "rows", "coil", "kepco-bop.toml"
-        )
-        (folder / "patient.toml").write_text(
-            row.read_text().replace("[serial]", '[serial]\ntimeout = "400 ms"')
-        )
-        (folder / "bench.toml").write_text(SERVED.format(port=port))
-
-    def run(self) -> subprocess.Popen:
-        """The run, once its current flows."""
-        run = subprocess.Popen(
-            [
-                *(sys.executable, "-m", "tactile_lab", "run", "scene.toml"),
-                *("--bench", "bench.toml", "--no-report", "--json"),
-            ],
-            cwd=self.folder,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-            env=os.environ | {"XDG_STATE_HOME": str(self.folder)},
-        )
-        until = time.monotonic() + PATIENCE
-        while not any(d["what"] == "set" and d["value"] > 0.2 for d in self.told()):
-            assert time.monotonic() < until, "no current ever flowed"
-            time.sleep(0.01)
-        return run
-
-    def told(self) -> list[dict]:
-        """Everything the source was told so far."""
-        text = self.log.read_text() if self.log.exists() else ""
-        whole = text[: text.rfind("\n") + 1]
-        return [json.loads(line) for line in whole.splitlines()]
-
-    def wait_until_off(self, since: float) -> None:
-        """Wait for output off after `since`, on this machine's monotonic clock."""
-        until = time.monotonic() + PATIENCE
-        while time.monotonic() < until:
-            for change in self.told():
-                if change["what"] == "output" and change["monotonic_s"] > since:
-                    assert change["value"] == 0
-                    return
-            time.sleep(0.005)
-        raise AssertionError("the output stayed on")
+def begun(folder, source):
+    """A run on the source, once its current flows."""
+    (folder / "scene.toml").write_text(SCENE)
+    run = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "tactile_lab", "run", "scene.toml"),
+            *("--bench", "bench.toml", "--no-report", "--json"),
+        ],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env=os.environ | {"XDG_STATE_HOME": str(folder)},
+    )
+    until = time.monotonic() + PATIENCE
+    while not any(d["what"] == "set" and d["value"] > 0.2 for d in source.told()):
+        assert time.monotonic() < until, "no current ever flowed"
+        time.sleep(0.01)
+    return run
 
 
-@pytest.fixture
-def served(tmp_path):
-    started = []
-
-    def serve(where):
-        started.append(Served(tmp_path, where))
-        return started[-1]
-
-    yield serve
-    for one in started:
-        one.process.terminate()
-        one.process.wait(PATIENCE)
-        one.process.stdout.close()
+def wait_until_off(source, since):
+    """Wait for output off after `since`, on this machine's monotonic clock."""
+    until = time.monotonic() + PATIENCE
+    while time.monotonic() < until:
+        for change in source.told():
+            if change["what"] == "output" and change["monotonic_s"] > since:
+                assert change["value"] == 0
+                return
+        time.sleep(0.005)
+    raise AssertionError("the output stayed on")
 
 
 @pytest.mark.parametrize(
@@ -114,18 +70,19 @@ def served(tmp_path):
     ],
     ids=lambda value: getattr(value, "name", None),
 )
-def test_the_output_goes_off(served, where, how, code):
-    served = served(where)
-    run = served.run()
-    since = time.monotonic()
-    run.send_signal(how)
-    served.wait_until_off(since)
-    out = run.communicate(timeout=PATIENCE)[0]
+def test_the_output_goes_off(tmp_path, where, how, code):
+    source = Source(tmp_path, where)
+    with closing(source.served):
+        run = begun(tmp_path, source)
+        since = time.monotonic()
+        run.send_signal(how)
+        wait_until_off(source, since)
+        out = run.communicate(timeout=PATIENCE)[0]
     assert run.returncode == code
-    assert [d["value"] for d in served.told() if d["what"] == "set"][-1] == 0.0
+    assert [d["value"] for d in source.told() if d["what"] == "set"][-1] == 0.0
     if code > 0:
         told = json.loads(out)
         assert told["coil_verified_off"] and told["status"] == "aborted"
     else:
-        (folder,) = (served.folder / "runs").iterdir()
+        (folder,) = (tmp_path / "runs").iterdir()
         assert (folder / "run.json").exists()

@@ -3,6 +3,7 @@
 import json
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from benches import SERVED
 
@@ -11,11 +12,16 @@ from tactile_lab.engine.request import Request
 
 
 class Source:
-    """A current source at a port of its own: it outlives window and engine."""
+    """A current source at a port of its own: it outlives window and engine.
 
-    def __init__(self, folder: Path) -> None:
+    Args:
+        folder: for its bench file and its log.
+        where: `pty`, or `tcp:0` for any free port.
+    """
+
+    def __init__(self, folder: Path, where: str = "pty") -> None:
         self.log = folder / "changes.jsonl"
-        self.served = ServedBench(coil="pty", log=self.log)
+        self.served = ServedBench(coil=where, log=self.log)
         self.served.start()
         row = resources.files("tactile_lab.instruments").joinpath(
             "rows", "coil", "kepco-bop.toml"
@@ -30,7 +36,10 @@ class Source:
     @property
     def output(self) -> bool:
         """Whether the output is on, from what the source was told."""
-        told = self.log.read_text()
-        whole = told[: told.rfind("\n") + 1]
-        changes = [json.loads(line) for line in whole.splitlines()]
-        return bool([d["value"] for d in changes if d["what"] == "output"][-1])
+        return bool([d["value"] for d in self.told() if d["what"] == "output"][-1])
+
+    def told(self) -> list[dict[str, Any]]:
+        """Everything it was told so far."""
+        text = self.log.read_text() if self.log.exists() else ""
+        whole = text[: text.rfind("\n") + 1]
+        return [json.loads(line) for line in whole.splitlines()]
