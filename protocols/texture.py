@@ -187,6 +187,7 @@ class Texture(ForceProtocol):
                     label="Scan",
                     series=(Series(x=x, y=y, mark="dots"),),
                     limits=(0.5, len(trials) + 0.5),
+                    whole=True,
                     note=show(speed, "m/s"),
                     height=1.3,
                 )

@@ -94,6 +94,7 @@ class Guide:
         text: beside the line, or at the beginning of a band.
         colour: as of a series; "quiet" and "band" are greys.
         dashed: whether the line is.
+        above: whether the text stands above a line across, not below it.
     """
 
     at: float
@@ -102,6 +103,7 @@ class Guide:
     text: str = ""
     colour: str = "quiet"
     dashed: bool = True
+    above: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,6 +118,7 @@ class Panel:
         guides: reference lines and bands.
         limits: of y, SI; None at either end for what the values need.
         log: whether y is logarithmic.
+        whole: whether y counts something.
         text: some lines within it, such as fitted values.
         corner: the one on the right where they stand.
         note: a small line above it.
@@ -130,6 +133,7 @@ class Panel:
     guides: tuple[Guide, ...] = ()
     limits: tuple[float | None, float | None] = (None, None)
     log: bool = False
+    whole: bool = False
     text: str = ""
     corner: Literal["upper", "lower"] = "upper"
     note: str = ""

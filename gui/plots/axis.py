@@ -99,15 +99,18 @@ class RoundAxis(pg.AxisItem):  # type: ignore[misc]
     def tickValues(self, low: float, high: float, size: float) -> Any:
         """The step, and the round values in [low, high]; powers where logarithmic.
 
-        Where less than two powers are in it, their multiples by 2 and 5, too.
+        Where less than three powers are in it, their multiples by 2 and 5, too, if
+        there is room.
         """
         if self.logMode:
             tens = range(math.floor(low) - 1, math.ceil(high) + 1)
+            roomy = math.log10(2) * size >= self._apart / 2 * (high - low)
+            found: list[float] = []
             for among in ((1,), (1, 2, 5), range(1, 10)):
+                if len(found) > (2 if roomy else 1):
+                    break
                 all_ = [ten + math.log10(k) for ten in tens for k in among]
                 found = [v for v in all_ if low - 1e-9 <= v <= high + 1e-9]
-                if len(found) > 1:
-                    break
             return [(1.0, found)]
         step, found = value_ticks(low, high, max(2, int(size / self._apart)))
         if step < self._least:

@@ -89,7 +89,8 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         self.setContentsMargins(0, 0, 0, 0)
         self.setSpacing(0)
         self.box = Box(self.at)
-        left, bottom = RoundAxis("left", 26), RoundAxis("bottom", 60, whole=plot.whole)
+        left = RoundAxis("left", 26, whole=panel.whole)
+        bottom = RoundAxis("bottom", 60, whole=plot.whole)
         if panel.label:
             self.addItem(_Heading(self._heading(y_text)), 0, 0, 1, 2)
         self.addItem(left, 1, 0)
@@ -217,7 +218,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
             (left, right), (_, top) = self.box.whole
             far = not across and ends[0] > left + 0.6 * (right - left)
             at = (left, ends[0]) if across else (ends[0], top)
-            self._write(at, guide.text, colour, (float(far), 0.0))
+            self._write(at, guide.text, colour, (float(far), float(guide.above)))
 
     def _write(
         self, at: Sequence[float], text: str, colour: str, anchor: tuple[float, float]

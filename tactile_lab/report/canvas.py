@@ -202,8 +202,10 @@ def _panel(axes: Axes, panel: Panel, x_factor: float) -> None:
         axes.set_yticks([])
         axes.spines["left"].set_visible(False)
     elif not panel.log:
-        few = max(3, round(3 * panel.height))
-        axes.yaxis.set_major_locator(MaxNLocator(few, steps=[1, 2, 5, 10]))
+        few = max(3, round((4 if panel.whole else 3) * panel.height))
+        axes.yaxis.set_major_locator(
+            MaxNLocator(few, steps=[1, 2, 5, 10], integer=panel.whole)
+        )
     _legend(axes, panel.series)
     if panel.text:
         up = panel.corner == "upper"
@@ -240,9 +242,11 @@ def _guide(axes: Axes, guide: Guide, factor: float) -> None:
         if not across:
             up = 0.99 if guide.to is None else 0.55
             place, where = (at, up), axes.get_xaxis_transform()
+        beside = (3, 0) if not across else (0, 3) if guide.above else (0, -3)
         axes.annotate(
-            _math(guide.text), place, (0, -3) if across else (3, 0), xycoords=where,
-            textcoords="offset points", va="top", size=7, color=colour, zorder=19,
+            _math(guide.text), place, beside, xycoords=where,
+            textcoords="offset points", va="bottom" if guide.above else "top", size=7,
+            color=colour, zorder=19,
         )  # fmt: skip
 
 

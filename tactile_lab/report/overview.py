@@ -139,7 +139,11 @@ def _voltages(
         # without force, what matters is how far the sensor is from firing
         at = run.circuit.critical_V_C1
         text = f"fires below {show(at, 'V')}"
-        guides.append(Guide(at=at, along="x", text=text, colour="V_C1"))
+        # clear of V_C1 on either side of it
+        lies = next((s.mean[-1] for s in signals if s.signal == "V_C1"), at)
+        guides.append(
+            Guide(at=at, along="x", text=text, colour="V_C1", above=bool(lies < at))
+        )
     guides += overranges(signals, axis)
     series = [_series(s, axis, name=s.signal) for s in signals]
     if model is not None:

@@ -51,7 +51,12 @@ def test_a_note_of_a_panel_is_told(app):
     notes = ("8 mm/s", "18 mm/s")
     panels = tuple(replace(panel, note=note) for note in notes)
     view = SmallPlot(Theme("dark"))
-    view.show_plot(replace(rates(1.0), panels=panels))
+    counted = tuple(replace(panel, whole=True) for panel in panels)
+    view.show_plot(replace(rates(1.0), panels=counted))
+    (left,) = (
+        i for i in view.panels[0].items if getattr(i, "orientation", "") == "left"
+    )
+    assert left.tickValues(0.5, 5.5, 150) == [(1.0, [1, 2, 3, 4, 5])]
     told = [
         [item.text for item in one.items if isinstance(item, pg.LabelItem)]
         for one in view.panels
@@ -244,6 +249,7 @@ def test_every_mark_is_drawn(app):
 @pytest.mark.parametrize(
     "low, high, told",
     [
+        (7.5, 110.0, ["10", "20", "50", "100"]),
         (1.0, 1e5, ["1", "10", "100", "1000", "10⁴", "10⁵"]),
         (2e-6, 3e-5, ["2·10⁻⁶", "5·10⁻⁶", "10⁻⁵", "2·10⁻⁵"]),
         (3.2, 4.7, ["4"]),

@@ -25,6 +25,13 @@ def test_a_flat_row_of_points_stands_clear_of_the_upper_end():
     assert high > 0.88 * 1.03
 
 
+def test_what_counts_has_whole_numbers_and_each_of_a_few():
+    dots = Series(x=[0, 1], y=[1, 5], mark="dots")
+    scans = axes(dots, limits=(0.5, 5.5), whole=True, height=1.3)
+    low, high = scans.get_ylim()
+    assert [y for y in scans.get_yticks() if low < y < high] == [1, 2, 3, 4, 5]
+
+
 def test_dollars_in_names_are_no_formula(tmp_path):
     odd = "a$b_{$ of V_C1"
     at = Series(x=[0.0, 1.0], y=[0.0, 1.0], mark="text", texts=(odd, odd))

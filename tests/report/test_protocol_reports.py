@@ -139,6 +139,8 @@ def test_monitor_tells_the_distance_to_threshold():
     assert distance == pytest.approx(4.347 - 3.974, abs=2e-3)
     drawn = overview(replace(run, searched=True))
     assert "Rate" not in [panel.label for panel in drawn.panels], "there is none"
+    texts = [(g.text, g.above) for panel in drawn.panels for g in panel.guides]
+    assert ("fires below 3.974 V", False) in texts
     coded = tuple(replace(trace, code=16e-3) for trace in run.traces)
     biased = {"follower": replace(Circuit(), I_bias=20e-12)}
     told = find(replace(run, traces=coded, displaced=biased)).conclusion
@@ -156,6 +158,11 @@ def test_monitor_tells_the_distance_to_threshold():
     told = find(replace(close, traces=tuple(
         replace(trace, code=16e-3) for trace in close.traces
     ))).conclusion  # fmt: skip
+    fires = overview(modelled(
+        "monitor", [("part 1", 0.0, quiet, False)], circuit=Circuit(V_GS=1.57)
+    ))  # fmt: skip
+    # of a sensor that fires V_C1 lies below, where it crossed the words
+    assert [g.above for p in fires.panels for g in p.guides if g.text] == [True]
     assert 0 < told.values["distance_to_threshold_V"] < 16e-3
     assert told.sentences[0].endswith("fires at rest cannot be told.")
 
