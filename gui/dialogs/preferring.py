@@ -19,11 +19,14 @@ from gui.parts import (
     line_edit,
     push,
     row,
+    say,
     scrolling,
     stack,
     with_gutter,
 )
 from gui.preferences import Preferences
+from tactile_lab.errors import RunFolderError, TactileLabError
+from tactile_lab.scene.load import load_bench
 
 SWITCHES = {
     "sound": "Sound at the end of a run, and three times at a fault",
@@ -45,6 +48,7 @@ class PreferencesCard(Overlay):
         self.folder = line_edit("Folder for runs", "runs")
         self.bench = line_edit("Bench at the start", "the last; sim, none, or a file")
         self.switches = {key: QCheckBox(words) for key, words in SWITCHES.items()}
+        self.problem = label("", "error", wrap=True)
         self.save = push("Save", "primary")
         self.close_button = push("Close")
         self.save.clicked.connect(self._save)
@@ -59,7 +63,7 @@ class PreferencesCard(Overlay):
         parts: tuple[Part, ...] = (
             self._chosen("Folder for runs", self.folder, folder=True),
             self._chosen("Bench at the start", self.bench, folder=False),
-            *(note, line(), *self.switches.values()),
+            *(note, self.problem, line(), *self.switches.values()),
         )
         area = with_gutter(scrolling(page), column(page, *parts, spacing=12))
         foot = row(STRETCH, self.close_button, self.save, spacing=12)
@@ -75,13 +79,22 @@ class PreferencesCard(Overlay):
         self.bench.setText(self._preferences.chosen_bench)
         for key, switch in self.switches.items():
             switch.setChecked(self._preferences.wants(key))
+        say(self.problem, "")
         self.open()
         self.folder.setFocus()
 
     def _save(self) -> None:
+        folder, bench = self.folder.text().strip(), self.bench.text().strip()
+        try:
+            check_folder(Path(folder))
+            if bench not in ("", "none"):
+                load_bench(bench)
+        except (TactileLabError, OSError) as error:
+            say(self.problem, str(error))
+            return
         self._preferences.set(
-            folder=self.folder.text().strip(),
-            bench=self.bench.text().strip(),
+            folder=folder,
+            bench=bench,
             **{key: switch.isChecked() for key, switch in self.switches.items()},
         )
         self.hide()
@@ -99,3 +112,14 @@ class PreferencesCard(Overlay):
 
     def _put(self, edit: QLineEdit, path: Path) -> None:
         edit.setText(str(path))
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse what can never be a folder for runs; it need not be there yet.
+
+    Raises:
+        RunFolderError: it, or what it would lie in, is a file.
+    """
+    there = next((one for one in (folder, *folder.parents) if one.exists()), None)
+    if there is not None and not there.is_dir():
+        raise RunFolderError(f"{there} is a file: choose a folder for runs.")

@@ -48,10 +48,20 @@ def test_settings_act_at_once(lab) -> None:
     card.folder.setText(str(lab.folder / "elsewhere"))
     card.switches["reports"].setChecked(False)
     card.switches["lsl"].setChecked(True)
+    file = lab.folder / "short.toml"
+    for field, unfit, right, said in (
+        (card.bench, str(lab.folder / "nothere.toml"), "sim", "nothere.toml"),
+        (card.folder, str(file / "runs"), card.folder.text(), f"{file} is a file"),
+    ):
+        field.setText(unfit)
+        card.save.click()
+        assert card.isVisible() and said in card.problem.text()
+        assert session.run.out == out, "nothing was saved"
+        field.setText(right)
     card.save.click()
     assert session.run.out == lab.folder / "elsewhere" and not card.isVisible()
     assert session.run.publish
-    window.preferences.set(folder=str(out), lsl=False)
+    window.preferences.set(folder=str(out), lsl=False, bench="")
     assert not session.run.publish
     assert session.out == out
 
