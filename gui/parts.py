@@ -35,6 +35,7 @@ from PySide6.QtWidgets import (
 from gui.look.icons import icon, pixmap
 from gui.look.theme import Theme
 from gui.look.tokens import DARK
+from gui.state import unmarked
 
 
 def label(text: str, role: str = "", *, wrap: bool = False) -> QLabel:
@@ -339,11 +340,8 @@ def line_edit(name: str, hint: str = "", text: str = "") -> QLineEdit:
 
 
 def say(where: QLabel, text: str) -> None:
-    """Show a text; hide the label where there is none.
-
-    Messages mark commands by back-ticks, as a terminal is used to; a window is not.
-    """
-    where.setText(text.replace("`", ""))
+    """Show a text; hide the label where there is none."""
+    where.setText(unmarked(text))
     where.setVisible(bool(text))
 
 

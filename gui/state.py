@@ -15,6 +15,11 @@ LAGS, MOVED = 0.3, 5e-3
 by so much since, A."""
 
 
+def unmarked(text: str) -> str:
+    """A message without the back-ticks by which a terminal marks commands."""
+    return text.replace("`", "")
+
+
 class WindowState(Enum):
     """The one state of the window."""
 

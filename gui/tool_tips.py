@@ -8,6 +8,8 @@ from PySide6.QtCore import QEvent, QObject, QRect
 from PySide6.QtGui import QHelpEvent
 from PySide6.QtWidgets import QApplication, QToolTip, QWidget
 
+from gui.state import unmarked
+
 LONGEST = 60
 """Characters of a line that is shown as it is."""
 
@@ -23,7 +25,7 @@ class ToolTips(QObject):
         """Show a long plain text in lines of its own; whether that was done."""
         if not isinstance(event, QHelpEvent) or not isinstance(watched, QWidget):
             return False  # classes first: this sees every event there is
-        text = watched.toolTip().replace("`", "")  # marks of a terminal
+        text = unmarked(watched.toolTip())
         if event.type() != QEvent.Type.ToolTip or "<" in text:
             return False
         if all(len(line) <= LONGEST for line in text.splitlines()):

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
+from gui.state import unmarked
+
 KEPT = 5000
 """Newest lines that are kept."""
 
@@ -66,8 +68,8 @@ class Log(QObject):
         run: Path | None = None,
     ) -> None:
         """Put a line into the log; `time`: of the run, s, where it has one."""
-        text = text.replace("`", "")  # which mark commands in a terminal
-        line = LogLine(datetime.now(), level, source, text, safety, time, run)
+        now, text = datetime.now(), unmarked(text)
+        line = LogLine(now, level, source, text, safety, time, run)
         self.lines.append(line)
         del self.lines[:-KEPT]
         self.added.emit(line)

@@ -6,7 +6,7 @@ from PySide6.QtCore import QObject, Signal
 
 from gui.session.coil import CoilWatch
 from gui.session.log import Log, Severity
-from gui.state import FaultNotice, WindowState
+from gui.state import FaultNotice, WindowState, unmarked
 from tactile_lab.bench import OffReport
 
 UNKNOWN = OffReport(False, None, "not verified")
@@ -38,10 +38,8 @@ class Status(QObject):
 
     def set_fault(self, title: str, consequence: str) -> None:
         """Something went wrong; a person must read it before anything goes on."""
-        # commands are marked by back-ticks, as a terminal is used to
-        title, consequence = title.replace("`", ""), consequence.replace("`", "")
         self.faulted.emit()
-        self.fault = FaultNotice(title, consequence)
+        self.fault = FaultNotice(unmarked(title), unmarked(consequence))
         self._log.add(Severity.ERROR, "safety", f"{title} {consequence}", safety=True)
         self.enter(WindowState.FAULT)
 

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from gui.parts import Combo
+from gui.state import unmarked
 from tactile_lab.plugins import protocol_class, protocol_names, scene_names
 from tactile_lab.trial import Protocol
 
@@ -93,4 +94,4 @@ def scene_of(protocol: str) -> str:
 def about(kind: type[Protocol]) -> str:
     """The first paragraph of a protocol's description, in one line."""
     first = (kind.__doc__ or "").strip().split("\n\n")[0]
-    return " ".join(first.replace("`", "").split())
+    return " ".join(unmarked(first).split())
