@@ -42,3 +42,24 @@ def test_a_cause_that_acts_more_one_way_widens_that_side_more():
     assert told.value == 1.0
     # both ends on one side: the other does not grow
     assert Estimate(1.0, 0.1, 0.8, 1.2).spanned((1.1, 1.2)).low == 0.8
+
+
+def test_the_error_of_what_spans_its_ends_is_that_of_its_mean_side():
+    told = Estimate(1.0, 0.1, 0.8, 1.2).spanned((0.9, 1.1))
+    more = (0.1 / 1.959964) ** 2
+    assert told.error == pytest.approx(math.sqrt(0.1**2 + more), rel=1e-6)
+
+
+def test_a_factor_below_zero_exchanges_the_ends():
+    told = Estimate(2.0, 0.5, 1.0, 4.0).scaled(-2.0)
+    assert (told.value, told.error, told.low, told.high) == (-4.0, 1.0, -8.0, -2.0)
+
+
+@pytest.mark.parametrize(
+    ("good", "low", "high"), [(8, 0.4902, 0.9433), (0, 0.0, 0.2775), (10, 0.7225, 1.0)]
+)
+def test_a_share_has_wilson_s_interval(good, low, high):
+    """Wilson, J. Am. Stat. Assoc. 22, 209 (1927), of 10 draws."""
+    told = Estimate.share(good, 10)
+    assert told.value == good / 10
+    assert (told.low, told.high) == pytest.approx((low, high), abs=5e-5)

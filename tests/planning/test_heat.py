@@ -5,7 +5,7 @@ import pytest
 
 from drivers.coil.interlock import HeatBudget
 from tactile_lab.bench import CoilLimits
-from tactile_lab.planning.heat import heat_along
+from tactile_lab.planning.heat import cool_down, heat_along, heat_left
 from tactile_lab.waveform import Waveform
 
 LIMITS = CoilLimits()
@@ -23,8 +23,20 @@ def test_below_the_continuous_current_it_cools():
     assert used == pytest.approx(20 * np.exp(-1))
 
 
-def test_same_as_the_interlock_on_a_staircase_of_set_points():
-    wave = Waveform.pulse(-1.8, ramp=0.5, hold=3, rest=20).then(
+@pytest.mark.parametrize("part", [0.02, 0.5, 1.0, 1.3])
+def test_a_coil_below_its_budget_is_warm_until_it_has_cooled(part):
+    used = part * LIMITS.heat
+    rest = cool_down(used, LIMITS)
+    assert rest > 0
+    assert heat_left(rest, LIMITS) == pytest.approx(used)
+    left, *_ = heat_along(Waveform.through([(0, 0), (rest, 0)]), LIMITS, used)
+    assert cool_down(left * (1 - 1e-9), LIMITS) == 0
+    assert heat_left(cool_down(0.0, LIMITS), LIMITS) == 0
+
+
+@pytest.mark.parametrize("rest", [20, 80], ids=["hottest last", "hottest first"])
+def test_same_as_the_interlock_on_a_staircase_of_set_points(rest):
+    wave = Waveform.pulse(-1.8, ramp=0.5, hold=3, rest=rest).then(
         Waveform.pulse(1.2, ramp=1.0, hold=5, rest=5)
     )
     budget = HeatBudget(LIMITS, 0.0)

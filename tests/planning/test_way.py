@@ -80,6 +80,17 @@ def test_a_run_on_a_link_faster_than_promised_takes_what_its_plan_allowed():
         drive_for(replace(trial, force=Waveform.pulse(0.1, ramp=3e4, hold=1)), scene, 0)
 
 
+def test_near_enough_is_a_share_of_all_force_from_zero_up():
+    """A small step about a bias was told why no list could play it."""
+    scene = load("demo", ("coil.accuracy=0.2",))
+    trial = plan(scene, preview=False).timeline.steps[0].trial
+    step = Waveform.through([(0, 0.1), (0.3, 0.1), (0.5, 0.105), (1, 0.105)])
+    before = float(scene.bench.magnet.current_for(step).value[0])
+    drive = drive_for(replace(trial, force=step, duration=1.0), scene, before)
+    assert drive.way == "set-points" and "No list" not in drive.why
+    assert 0.2 * 0.005 < drive.error < 0.2 * 0.1
+
+
 def test_where_no_way_is_near_enough_the_nearest_is_taken_and_said():
     phases = "protocol.highest=200 Hz", "protocol.lowest=200 Hz", "protocol.count=1"
     scene = load("sine_sweep", (*phases, "coil.accuracy=1e-3", "protocol.cycles=9"))

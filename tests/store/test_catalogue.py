@@ -1,6 +1,7 @@
 """The catalogue lists what is there, and its index is never trusted too far."""
 
 import csv
+import math
 import re
 import shutil
 import sqlite3
@@ -13,6 +14,7 @@ from click.testing import CliRunner
 from tactile_lab.cli import cli
 from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.store.catalogue import Catalogue
+from tactile_lab.store.facts import of_results
 from tactile_lab.store.folder import RunFolder, read_info, write_json
 from tactile_lab.store.index import FILE as INDEX
 from tactile_lab.store.remarks import add_note
@@ -128,6 +130,14 @@ def test_runs_are_found_by_what_they_are(levels, where, taus):
     with Catalogue(levels) as found:
         fitting = found.known(found.runs(where=where))
     assert [table["tau"][0].number for table in fitting] == taus
+
+
+def test_what_a_protocol_concludes_stands_for_its_trials_and_is_a_number():
+    trial = {"circuit_adaptation": {"tau_s": 9.0}, "rest_V_C1_V": 4.3}
+    concluded = {"tau_s": {"value": 3.0}, "gain": math.nan, "offset_V": math.inf}
+    told = of_results({"conclusion": concluded, "trials": [trial, trial]})
+    found = [(fact.key, fact.number, fact.unit) for fact in told]
+    assert found == [("tau", 3.0, "s"), *[("rest_V_C1", 4.3, "V")] * 2]
 
 
 @pytest.mark.parametrize(
