@@ -96,9 +96,9 @@ class ResultsView(QWidget):
         self.plot = SmallPlot(theme)
         self.trains = SmallPlot(theme)
         self.trains.hide()
-        self._later = QTimer(self)  # both plots in one turn are a late frame
+        self._later = QTimer(self)  # steps and their fit may come in one frame
         self._later.setSingleShot(True)
-        self._later.timeout.connect(self._show_trains)
+        self._later.timeout.connect(self._draw_rates)
         self.loop = SmallPlot(theme)
         self.loop.hide()
         self.answers: list[SmallPlot] = []
@@ -211,7 +211,11 @@ class ResultsView(QWidget):
         self._arrange()
 
     def _show_rates(self) -> None:
+        """Draw the rates, and in a turn of their own the trains: each takes 10 ms."""
         self.plot.nothing = self._nothing
+        self._later.start()
+
+    def _draw_rates(self) -> None:
         y, x = self.drawn.currentText(), self.against.currentText()
         if not self._fires:
             shown = None
@@ -220,9 +224,9 @@ class ResultsView(QWidget):
         else:
             shown = column_plot(self._steps, y, x)
         self.plot.show_plot(shown)
-        self._later.start()
+        QTimer.singleShot(0, self, self._draw_trains)
 
-    def _show_trains(self) -> None:
+    def _draw_trains(self) -> None:
         self.trains.show_plot(train_plot(self._steps, self._laws))
         self._arrange()
 
