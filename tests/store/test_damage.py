@@ -95,13 +95,17 @@ def test_a_group_of_samples_that_is_gone_is_damage(complete):
     assert found == ["data.h5 /samples/V_C1", "data.h5 /samples/V_K"]
 
 
-def test_a_certificate_that_the_data_does_not_bear_out_is_damage(complete):
+@pytest.mark.parametrize(
+    "name", ["produced", "written", "gaps", "spikes_online", "spikes_offline"]
+)
+def test_a_certificate_that_the_data_does_not_bear_out_is_damage(complete, name):
     info = json.loads((complete / "run.json").read_text())
-    info["loss"]["spikes_offline"] += 1
+    true = info["loss"][name]
+    info["loss"][name] += 1
     (complete / "run.json").write_text(json.dumps(info))
     (finding,) = verify(complete).findings
-    assert finding.where == "run.json loss.spikes_offline"
-    assert "says 8; counted again it is 7" in finding.what
+    assert finding.where == f"run.json loss.{name}"
+    assert f"says {true + 1}; counted again it is {true}" in finding.what
 
 
 @pytest.mark.parametrize(
