@@ -146,8 +146,8 @@ T_1's emitter.*
 
 ## Assumptions
 
-- **R3, I_T1s, the reset voltage** are not in the text; our choices and their
-  alternatives are in [model.md](model.md).
+- **Where R3 sits, I_T1s and the reset voltage** are not in the text; our choices and
+  their alternatives are in [model.md](model.md).
 - **Fig. 5b and 5c are one run** here: the paper says of one that the spikes vanish
   after about 50 s and of the other that about 50 mN were applied, not that they are the
   same measurement.
