@@ -132,6 +132,19 @@ def test_a_list_that_may_not_be_played(bench, currents, dwell, why):
     assert bench.source.list.points == []
 
 
+def test_a_list_that_is_loaded_does_not_start_while_the_coil_is_too_hot(bench):
+    length = play(bench.coil, [2.0] * 5 + [0.0], 1.0)
+    bench.clock.sleep_until(bench.clock.now() + length + 0.1)
+    bench.coil.end_list()
+    before = list(bench.source.changes)
+    with pytest.raises(LimitError, match=r"With this list: .*heat budget"):
+        bench.coil.start_list()
+    assert bench.source.changes == before
+    bench.clock.sleep_until(bench.clock.now() + 300)
+    bench.coil.start_list()
+    assert bench.source.list.playing
+
+
 def test_a_list_made_for_the_slew_limit_is_not_refused_for_its_rounding(bench):
     row, limits = bench.coil.dialect, bench.coil.limits
     top = 0.0501 / limits.fastest
