@@ -92,6 +92,32 @@ def test_steps_never_exceed_the_slew_limit(bench):
         assert change <= coil.limits.slew * passed + 3e-3
 
 
+def test_a_step_whose_answer_was_lost_is_where_the_next_begins(serial_bench):
+    clock, far, coil = serial_bench.clock, serial_bench.source, serial_bench.coil
+    coil.open()
+    coil.energise()
+    play(clock, coil, [0.5] * 10)
+    seen = len(far.changes)
+    serial_bench.end.faults.add(SerialFault(kind="missing", times=12))
+    with pytest.raises(InstrumentError):
+        for _ in range(12):
+            coil.set_current(1.5)
+    taken = far.setpoint
+    assert taken > 0.5, "it was heard"
+    for _ in range(12):
+        try:
+            play(clock, coil, [-1.5])
+            break
+        except InstrumentError:
+            continue
+    most = coil.limits.slew * max(2 * coil.update_interval, CATCH_UP) + 3e-3
+    values = [
+        change.value for change in far.changes[seen - 1 :] if change.what == "set"
+    ]
+    assert values[-1] < taken
+    assert all(abs(b - a) <= most for a, b in itertools.pairwise(values))
+
+
 @pytest.mark.parametrize("current", [2.1, -2.1, math.nan, math.inf])
 def test_refuses_what_may_never_be_set(bench, current):
     *_, far, coil = bench
