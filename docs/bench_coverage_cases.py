@@ -203,7 +203,7 @@ def rate_force(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     exact = Estimate(true.circuit.V_GS, 0.0, true.circuit.V_GS, true.circuit.V_GS)
     one = Estimate(1.0, 0.0, 1.0, 1.0)
     law = RateLaw(
-        V_GS=exact, scale=one, scatter=0.0, intervals=0, correlation=0.0,
+        V_GS=exact, scale=one, intervals=0, correlation=0.0,
         charging=Charging(true.circuit),
     )  # fmt: skip
     yield from of("V_GS", values.get("rate_law_V_GS_V"), true.circuit.V_GS)

@@ -18,9 +18,9 @@ from sim_backend.plant import sensor  # noqa: E402
 from sim_backend.plant.options import PlantOptions  # noqa: E402
 from sim_backend.plant.plant import Plant  # noqa: E402
 from sim_backend.plant.render import digitise, noise_table  # noqa: E402
-from tactile_lab.bench import Channel  # noqa: E402
 from tactile_lab.magnetics import Magnet  # noqa: E402
 from tactile_lab.model.circuit import Circuit  # noqa: E402
+from tactile_lab.scope import Channel  # noqa: E402
 from tactile_lab.waveform import Waveform  # noqa: E402
 
 DURATION = 18.0

@@ -42,6 +42,7 @@ from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import DATA, RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
+from tactile_lab.store.write_queue import QUEUE_BYTES
 
 SIGNALS = ("V_C1", "V_C2", "V_K", "coil_current")
 ROW = 2
@@ -95,13 +96,15 @@ def one(rate: float, seconds: float, root: Path) -> str:
     folder = RunFolder.create(root, "sustained", {})
     layout = Layout(signals=SIGNALS, detection=DETECTION, simulated=True)
     recorder = Recorder(folder, layout, sync=True, when_full="error")
+    queue = recorder._queue
+    assert queue is not None
     intake.begin(stream, 0.0, recorder, detector, ROW)
     worked, began, ended, fullest = time.process_time(), time.monotonic(), "", 0.0
     try:
         while intake.reached < seconds:
             while (block := thread.take()) is not None:
                 intake.add(block)
-                fullest = max(fullest, recorder.waiting)
+                fullest = max(fullest, queue._bytes / QUEUE_BYTES)
             thread.raise_failure()
             clock.wait_for(
                 lambda: thread.waiting > 0 or thread.failure is not None,
