@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from protocols.rate_force import RateForce
+from protocols.sine_sweep import SineSweep
 from tactile_lab.analysis.charging import Charging
 from tactile_lab.analysis.estimate import Z95, Estimate
 from tactile_lab.analysis.rate_force import RateLaw
@@ -142,6 +144,7 @@ def bipolar(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     for change in values.get("I_DS_changes", ()):
         trial = next(t for t in run.results if t.label == change["label"])
         arrived = run.applied_edge(trial)
+        assert arrived is not None
         later = 0.1  # the force is wholly there; V_P is followed back to `arrived`
         V_P = made.sample("V_P", np.array([trial.start - 0.1, arrived + later]))
         V_P[1] *= np.exp(later / true.circuit.tau)
@@ -169,6 +172,7 @@ def sine_sweep(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     """Gain and phase of each frequency, the truth by a long sine."""
     from tactile_lab.analysis.response import gain
 
+    assert isinstance(run.protocol, SineSweep)
     amplitude = run.protocol.amplitude * true.scale
     for found in values.get("V_C1_over_force", ()):
         f = found["frequency_Hz"]
@@ -206,6 +210,7 @@ def rate_force(run: RunData, values: dict[str, Any], true: Truth) -> Told:
         V_GS=exact, scale=one, intervals=0, correlation=0.0,
         charging=Charging(true.circuit),
     )  # fmt: skip
+    assert isinstance(run.protocol, RateForce)
     yield from of("V_GS", values.get("rate_law_V_GS_V"), true.circuit.V_GS)
     yield from of("force over stated", values.get("rate_law_scale"), true.scale)
     for which, found in zip(
@@ -271,7 +276,8 @@ def critical(run: RunData, true: Truth) -> float:
         spikes = simulate(
             true.circuit, shape.scaled(middle), keep=("spikes",), tolerance=1e-7
         ).spike_times
-        low, high = (low, middle) if np.size(spikes) else (middle, high)
+        assert spikes is not None
+        low, high = (low, middle) if spikes.size else (middle, high)
     return high
 
 

@@ -13,8 +13,9 @@ import textwrap
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,16 +60,22 @@ def law(seed: int, shape: float, truth: Truth, hold: float) -> dict[str, Estimat
     return {"alpha": fit.alpha, "beta": fit.beta, "gamma": fit.gamma}
 
 
-def circuit_run(truth: Truth) -> tuple[NDArray, NDArray]:
+def circuit_of(truth: Truth) -> Circuit:
+    """A circuit with these parameters."""
+    parts: dict[str, Any] = {**truth}
+    return replace(Circuit(), **parts)
+
+
+def circuit_run(truth: Truth) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Bin centres and V_C1 there of a circuit with these parameters."""
-    made = simulate(replace(Circuit(), **truth), FORCE, keep=("V_C1",))
+    made = simulate(circuit_of(truth), FORCE, keep=("V_C1",))
     middle = (np.arange(BINS) + 0.5) * FORCE.end / BINS
     return middle, made.sample("V_C1", middle)
 
 
 def fired(truth: Truth, wobble: float, seed: int) -> NDArray[np.float64]:
     """Spikes where V_fire is another each time, by `wobble` V standard deviation."""
-    circuit, rng = replace(Circuit(), **truth), np.random.default_rng(seed + 10**6)
+    circuit, rng = circuit_of(truth), np.random.default_rng(seed + 10**6)
     made = _fine(tuple(sorted(truth.items())))
     now, V_C2, spikes = 0, rest_V_C2(circuit, rest_V_C1(circuit)), []
     window = int(0.5 / FINE)
@@ -96,7 +103,7 @@ def fired(truth: Truth, wobble: float, seed: int) -> NDArray[np.float64]:
 @cache
 def _fine(truth: tuple[tuple[str, float], ...]) -> NDArray[np.float64]:
     """I_C on a fine grid, A."""
-    circuit = replace(Circuit(), **dict(truth))
+    circuit = circuit_of(dict(truth))
     made = simulate(circuit, FORCE, keep=("V_C1",))
     grid = np.arange(0, FORCE.end, FINE)
     return np.asarray(I_C(circuit, made.sample("V_C1", grid)))
@@ -173,9 +180,7 @@ def cases() -> list[tuple[str, Truth, Fit]]:
     ):
         truth = {"alpha": alpha, "beta": beta, "gamma": gamma}
         title = f"rate law, {hold:g} s, irregularity {shape**-0.5:.2f}"
-        found.append(
-            (title, truth, lambda s, k=shape, t=truth, h=hold: law(s, k, t, h))
-        )
+        found.append((title, truth, partial(law, shape=shape, truth=truth, hold=hold)))
     two = {"V_GS": 1.405, "tau": 8.3}
     found.append(("circuit, V_C1", two, identified(two, None)))
     three = {**two, "V_th": 3.15}

@@ -35,7 +35,7 @@ from tactile_lab.waveform import Waveform
 
 DOCS = Path(__file__).parent
 OFFSETS = (-3e-3, -1e-3, 0.0, 0.5e-3)
-SCENES = {
+SCENES: dict[str, tuple[str, list[str]]] = {
     name: (name, [])
     for name in (
         "demo", "rate_force", "hold_10s", "fig5b", "repeat", "bipolar",

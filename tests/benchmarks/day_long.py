@@ -169,7 +169,8 @@ def main() -> int:
     options.add_argument("--scene", choices=kinds, action="append")
     options.add_argument("--out", type=Path)
     chosen = options.parse_args()
-    rows, flat = [], True
+    rows: list[str] = []
+    flat = True
     with tempfile.TemporaryDirectory() as root:
         for scene in chosen.scene or kinds:
             of = watched if scene == "watched" else partial(one, scene)

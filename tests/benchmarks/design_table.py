@@ -107,7 +107,9 @@ def good(chosen: Chosen, circuit: Circuit) -> bool:
 
 
 def _spikes(circuit: Circuit, force: float, hold: float) -> np.ndarray:
-    return simulate(circuit, push(hold, force)).spike_times
+    spikes = simulate(circuit, push(hold, force)).spike_times
+    assert spikes is not None
+    return spikes
 
 
 def counted_again(chosen: Chosen) -> Estimate:
@@ -115,7 +117,7 @@ def counted_again(chosen: Chosen) -> Estimate:
     rng = np.random.default_rng(2026)
     met = 0
     for _ in range(AGAIN):
-        parts = {
+        parts: dict[str, Any] = {
             part.name: float(value + part.spread(value) * rng.standard_normal())
             for part in chosen.asked.parts
             for value in (chosen.values[part.name],)

@@ -84,7 +84,9 @@ def _scope(**fault: Any) -> Cause:
     """A fault of the scope at a random sample, unless at a call."""
 
     def cause(chance: random.Random) -> Injection:
-        when = {} if "call" in fault else {"sample": chance.randint(*SAMPLES)}
+        when: dict[str, Any] = (
+            {} if "call" in fault else {"sample": chance.randint(*SAMPLES)}
+        )
         return Injection(scope=(ScopeFault(**when, **fault),))
 
     return cause

@@ -36,8 +36,9 @@ from usb_fault_rows import session
 
 from sim_backend.bench import open_bench
 from sim_backend.coil.list_mode import ListFault
+from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.engine.execution import Executed, Execution
+from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import TactileLabError
 from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
@@ -180,7 +181,8 @@ def main() -> int:
     options.add_argument("--row", default="", help="only rows with this in their title")
     options.add_argument("--out", type=Path)
     chosen = options.parse_args()
-    lines, total, bad = [], Counter[str](), []
+    lines: list[str] = []
+    total, bad = Counter[str](), list[str]()
     groups: list[tuple[list[Row], Callable[..., tuple[Counter[str], list[str]]]]] = [
         (SERIAL, runs), (PLAYED, runs), (SCOPE, runs), (USB, usb_runs)
     ]  # fmt: skip

@@ -97,9 +97,9 @@ def measured(scene: Scene) -> str:
     commands: list[tuple[float, float]] = []
     usual = Electromagnet.command
 
-    def heard(self: Electromagnet, time: float, amperes: float) -> bool:
-        commands.append((time, amperes))
-        return usual(self, time, amperes)
+    def heard(self: Electromagnet, time: float, target: float) -> bool:
+        commands.append((time, target))
+        return usual(self, time, target)
 
     Electromagnet.command = heard  # type: ignore[method-assign]
     try:

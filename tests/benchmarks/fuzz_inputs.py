@@ -251,7 +251,7 @@ def _run(chance: random.Random, place: Path) -> Case:
     folder = place / "run"
     shutil.copytree(_whole(), folder)
     what = damaged_folder(folder, chance)
-    calls = [("verify", str(folder)), ("show", str(folder))]
+    calls: list[tuple[str, ...]] = [("verify", str(folder)), ("show", str(folder))]
     if chance.random() < 0.2:
         calls.append(("report", str(folder)))
     if chance.random() < 0.2:

@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -68,11 +69,11 @@ def main() -> None:
         own, other = [], []
         for _ in range(3):
             own.append(
-                least(lambda s=scene: simulate(s.circuit, s.force, until=s.until), 20)
+                least(
+                    partial(simulate, scene.circuit, scene.force, until=scene.until), 20
+                )
             )
-            other.append(
-                least(lambda s=scene: general.cvode(s, "Adams", 1e-9, 60.0), 1)
-            )
+            other.append(least(partial(general.cvode, scene, "Adams", 1e-9, 60.0), 1))
         print(
             f"  {scene.name:9s} ours {min(own) * 1e3:7.3f} ms, CVODE "
             f"{min(other) * 1e3:8.1f} ms, ratio {min(other) / min(own):.0f}"

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from provenance import provenance
 
@@ -61,7 +62,7 @@ def measure(scene: str, changes: tuple[str, ...]) -> dict[str, object]:
     }
 
 
-def line(row: dict) -> tuple[str, float]:
+def line(row: dict[str, Any]) -> tuple[str, float]:
     """A row of the table, and by which factor it is off at most."""
     cells, worst = [], 1.0
     for key, scale in (("seconds", 1.0), ("bytes", 1e6)):
@@ -72,7 +73,7 @@ def line(row: dict) -> tuple[str, float]:
     return f"| {row['scene']} | {' | '.join(cells)} |", worst
 
 
-def page(rows: list[dict]) -> str:
+def page(rows: list[dict[str, Any]]) -> str:
     """The table, and what single parts of the demo saved."""
     shipped = [line(row)[0] for row in rows if not row["changes"]]
     whole = next((r for r in rows if r["scene"] == "demo" and not r["changes"]), None)

@@ -52,8 +52,12 @@ def make(root: Path, runs: int) -> None:
             "spikes_online": i % 500,
             "loss": {"text": "loss: 0 of 44,422,916 samples, 0 of 15 spikes"},
         }
-        trial = {"rest_V_C1_V": 4.3, "peak_rate_Hz": 30.0, "latency_s": 0.2}
-        trial |= {"circuit_adaptation": {"tau_s": 9.0 + i % 7}}
+        trial = {
+            "rest_V_C1_V": 4.3,
+            "peak_rate_Hz": 30.0,
+            "latency_s": 0.2,
+            "circuit_adaptation": {"tau_s": 9.0 + i % 7},
+        }
         results = {"conclusion": {"critical_force_N": force}, "trials": [trial] * 8}
         folder = root / f"{i:06d}_demo"
         folder.mkdir()
@@ -68,7 +72,8 @@ def measured(act: Callable[[], object], times: int = TIMES) -> tuple[float, floa
         before, began = _processor(), time.perf_counter()
         act()
         told.append((_processor() - before, time.perf_counter() - began))
-    return tuple(map(statistics.median, zip(*told, strict=True)))  # type: ignore[return-value]
+    used, took = map(statistics.median, zip(*told, strict=True))
+    return used, took
 
 
 def _processor() -> float:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -73,12 +74,10 @@ def main() -> None:
         codes = signal(samples, spikes * samples // PER)
         expected = detect(codes, DETECTION).size
         assert in_blocks(codes) == expected
-        top = rate(lambda data=codes: data.max(), samples)
-        ours = rate(lambda data=codes: in_blocks(data), samples)
+        top = rate(codes.max, samples)
+        ours = rate(partial(in_blocks, codes), samples)
         part = codes[: samples // PEAKS_SHARE]
-        peaks = rate(
-            lambda data=part: find_peaks(data, height=3000, distance=8), part.size, 2
-        )
+        peaks = rate(partial(find_peaks, part, height=3000, distance=8), part.size, 2)
         count = find_peaks(part, height=3000, distance=8)[0].size
         assert count == detect(part, DETECTION).size
         rows.append(

@@ -90,7 +90,8 @@ def hdf5(path: Path, pool: Blocks, count: int, **filters: object) -> Path:
 
 def zarr(path: Path, pool: Blocks, count: int) -> Path:
     """Zarr 3 with its Blosc LZ4 and bit shuffle."""
-    import zarr as library  # in no group of this project: see the module's docstring
+    import zarr as library
+    from zarr.codecs import BloscCodec, BloscShuffle
 
     folder = path / "run.zarr"
     samples = library.create_array(
@@ -98,9 +99,7 @@ def zarr(path: Path, pool: Blocks, count: int) -> Path:
         shape=(4, count * SIZE),
         chunks=(1, SIZE),
         dtype="i2",
-        compressors=library.codecs.BloscCodec(
-            cname="lz4", clevel=1, shuffle=library.codecs.BloscShuffle.bitshuffle
-        ),
+        compressors=BloscCodec(cname="lz4", clevel=1, shuffle=BloscShuffle.bitshuffle),
     )
     for number in range(count):
         at = slice(number * SIZE, (number + 1) * SIZE)

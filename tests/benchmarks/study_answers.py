@@ -39,6 +39,7 @@ def shares(study: Study, of: str, variance: float) -> dict[str, float]:
     drive = timeline(scene, through_coil=False)
     effects = {}
     for axis in study.design.drawn:
+        assert axis.spread is not None
         name, width = axis.key.partition(".")[2], axis.spread.width
         at = getattr(scene.sensor, name)
         steps = (
@@ -54,6 +55,7 @@ def shares(study: Study, of: str, variance: float) -> dict[str, float]:
                 found.append(critical_force(circuit))
             else:
                 result = simulate(circuit, drive.force, until=drive.duration)
+                assert result.spike_times is not None
                 found.append(len(result.spike_times))
         weight = np.exp(-0.5 * steps**2)
         values = np.array(found, dtype=float)

@@ -24,6 +24,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 from provenance import provenance, tell
 
@@ -77,7 +78,7 @@ def answer(folder: Path) -> str:
     """Hash of everything in the data set."""
     found = carry_out(STUDY, folder, count=1).to_xarray()
     whole = hashlib.blake2b()
-    for name in sorted(found.variables):
+    for name in sorted(map(str, found.variables)):
         whole.update(name.encode() + found[name].values.tobytes())
     return whole.hexdigest()
 
@@ -113,7 +114,7 @@ def dask(folder: Path) -> Iterator[tuple[str, int, list[int]]]:
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)
     command = [sys.executable, "-m"]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     scheduler = subprocess.Popen(
         [*command, "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard",
          "--host", "127.0.0.1", "--scheduler-file", str(file)], **quiet,

@@ -16,10 +16,11 @@ import os
 import resource
 import tempfile
 import time
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from multiprocessing import Pool
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from distributed import LocalCluster
@@ -84,17 +85,12 @@ class Measured:
     memory: float
 
 
-@contextmanager
-def _nothing():
-    yield None
-
-
 def carried_out(study: Study, cluster: bool) -> Measured:
     """Carry the study out in a child process of its own, and measure it."""
     reader, writer = os.pipe()
     if (child := os.fork()) == 0:
         with tempfile.TemporaryDirectory() as folder:
-            context = (
+            context: AbstractContextManager[Any] = (
                 LocalCluster(
                     n_workers=WORKERS,
                     threads_per_worker=1,
@@ -102,7 +98,7 @@ def carried_out(study: Study, cluster: bool) -> Measured:
                     memory_limit=0,
                 )
                 if cluster
-                else _nothing()
+                else nullcontext()
             )
             with context as scheduler:
                 address = scheduler and scheduler.scheduler_address
@@ -152,7 +148,8 @@ def plainly(
     parts: dict[str, float], times: np.ndarray, values: np.ndarray, until: float
 ) -> int:
     """The same scene by solve_ivp, as one would write it: spikes are events."""
-    circuit = Circuit(**parts)
+    named: dict[str, Any] = {**parts}
+    circuit = Circuit(**named)
     k, tau = circuit.k_F, circuit.tau
     slopes = np.append(np.diff(values) / np.diff(times), 0)
 
@@ -167,12 +164,13 @@ def plainly(
     def fires(t: float, y: np.ndarray) -> float:
         return float(y[2] - circuit.V_th)
 
-    fires.terminal, fires.direction = True, 1
+    event: Any = fires
+    event.terminal, event.direction = True, 1
     y, t, spikes = np.array([0.0, *rest_point(circuit)]), 0.0, 0
     for end in (*times[(times > 0) & (times < until)], until):
         while t < end:
             found = solve_ivp(
-                slope, (t, end), y, "LSODA", events=fires, rtol=1e-9, atol=1e-11
+                slope, (t, end), y, "LSODA", events=event, rtol=1e-9, atol=1e-11
             )
             t, y = found.t[-1], found.y[:, -1]
             if found.status == 1:
@@ -199,6 +197,7 @@ def plain_rate(study: Study) -> tuple[float, bool]:
         design.repeats(np.arange(PLAIN)),
     )
     ours = points.batch(task).columns["spike_count"]
+    assert isinstance(ours, np.ndarray)
     return PLAIN / wall, bool(np.array_equal(ours, counts))
 
 

@@ -42,10 +42,12 @@ def drawn(seed: int) -> tuple[dict[str, float], dict[str, float]]:
     """What lies beyond its band, and the whole deviation of this seed's world."""
     rng = np.random.default_rng(seed)
     bench = load("surprise").bench
+    followers, lag = bench.followers, bench.magnet.lag_uncertainty
+    assert followers is not None and lag is not None
     bands = {
-        "input_bias": bench.followers.input_bias_uncertainty,
-        "offset": bench.followers.offset_uncertainty,
-        "lag": bench.magnet.lag_uncertainty,
+        "input_bias": followers.input_bias_uncertainty,
+        "offset": followers.offset_uncertainty,
+        "lag": lag,
     }
     world = {
         name: float(np.clip(rng.normal(0, band / 1.96), -band, band))
@@ -69,6 +71,7 @@ def row(seed: int) -> dict[str, object]:
     scene = load("surprise", {**PULSES, **keys, "simulated.seed": seed + 1})
     with tempfile.TemporaryDirectory() as scratch:
         beside = find(read(Execution(scene, Path(scratch)).run().folder)).beside
+    assert beside is not None
     explanation = beside.explanation
     cause = None if explanation is None else explanation.cause
     size = None if cause is None else cause.size

@@ -51,13 +51,14 @@ def endurance(seconds: float, folder: Path) -> None:
     (folder / "hour.toml").write_text(HOUR.format(seconds=seconds))
     request = Request(str(folder / "hour.toml"), (), "sim")
     session.start(request, "hour")
-    begun, first = time.monotonic(), ()
+    begun = time.monotonic()
+    first: tuple[float, float] | None = None
     print("| run, s | wall, s | window, MB | engine, MB |\n|---|---|---|---|")
     for part in (0.05, 0.25, 0.5, 0.75, 1.0):
         bench.until(
-            lambda part=part: (
+            lambda: (
                 session.state is not WindowState.RUNNING
-                or (session.source and session.source.reach >= part * seconds)
+                or (session.source and session.source.reach >= part * seconds)  # noqa: B023  waited for
             ),
             3600,
         )
@@ -70,6 +71,7 @@ def endurance(seconds: float, folder: Path) -> None:
         )
     bench.until(lambda: session.state in (WindowState.READY, WindowState.FAULT), 60)
     fault = "" if session.status.fault is None else f": {session.status.fault.title}"
+    assert session.source is not None
     bench.say(
         f"Then {session.state.value} {fault}, {session.source.spikes.size} spikes."
     )

@@ -106,7 +106,7 @@ class Bench:
     def _note_painting(self) -> None:
         self._painted = True
 
-    def until(self, done, longest: float) -> None:
+    def until(self, done: Callable[[], object], longest: float) -> None:
         end = time.monotonic() + longest
         while not done() and time.monotonic() < end:
             self.app.processEvents(SLEEPING)
@@ -177,7 +177,7 @@ def hour(source: LiveSource) -> None:
     """Fill a source with an hour at 1 MS/s, as its 1 ms bins."""
     rng = np.random.default_rng(2)
     for first in range(0, 3_600_000, 100_000):
-        time_ = 1e-3 * np.arange(first, first + 100_000)
+        time_ = np.float64(1e-3) * np.arange(first, first + 100_000)
         for signal in SIGNALS:
             mean = (np.sin(time_) + rng.normal(0, 0.05, time_.size)).astype(np.float32)
             bins = Trace.bins(time_, mean - 0.05, mean + 0.05, mean, 1e-3)
@@ -263,9 +263,9 @@ def main(seconds: float) -> None:
         bench.until(lambda: source.reach > 0.2, 5)
         bench.measure("4 x 7.8125 MS/s emulated", seconds)
         session.source = source = LiveSource(None, 0.2)
-        before = memory()
+        empty = memory()
         hour(source)
-        bench.say(f"An hour at 4 x 1 MS/s takes {memory() - before:.0f} MB.")
+        bench.say(f"An hour at 4 x 1 MS/s takes {memory() - empty:.0f} MB.")
         window.centre.stack.show_source(source)
         window.centre.view.set_now(3600.0, 3600.0)
         window.centre.view.show_all()

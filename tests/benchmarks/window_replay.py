@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from PySide6.QtCore import QEvent
@@ -24,6 +25,7 @@ from window_frames import Bench
 from gui.app import begin
 from gui.state import WindowState
 from tactile_lab.engine.events import Ended, Samples, TaskEvent
+from tactile_lab.engine.link import RemoteTask
 
 FRAME, FIRST = 1 / 30, 30
 """Run time of a frame, s; frames that are left out, of the beginning."""
@@ -50,12 +52,17 @@ def ready(bench: Bench) -> None:
 
 def record(bench: Bench, file: Path) -> None:
     """Run the demo, and keep what was told of it."""
-    run, kept = bench.session.run, []
+    run, kept = bench.session.run, list[TaskEvent]()
     hear = run.take
-    run.take = lambda event: (kept.append(event), hear(event))
+
+    def keep(event: TaskEvent) -> None:
+        kept.append(event)
+        hear(event)
+
+    run.take = keep  # type: ignore[method-assign]
     bench.window.setup.start()
     bench.until(lambda: kept and not bench.session.busy, 120)
-    run.take = hear
+    run.take = hear  # type: ignore[method-assign]
     file.write_bytes(pickle.dumps(kept))
 
 
@@ -72,7 +79,8 @@ def timed(events: list[TaskEvent]) -> list[tuple[float, TaskEvent]]:
 def replay(bench: Bench, events: list[TaskEvent], seconds: float) -> None:
     """Print what each frame took, ms of the thread's processor time."""
     session, run = bench.session, bench.session.run
-    run.expectation, run.title, run.task = session.plan.expectation, "demo", Nobody()
+    run.expectation, run.title = session.plan.expectation, "demo"
+    run.task = cast(RemoteTask, Nobody())
     session.status.enter(WindowState.RUNNING)
     waiting, lanes, rest = timed(events), bench.window.centre.stack.scene, 0.0
     painted: list[int] = []

@@ -10,6 +10,8 @@ machine does falls on both alike. Figures are the processor time of the window's
 thread, ms a frame, medians of the frames and of the rounds.
 """
 
+from __future__ import annotations
+
 import argparse
 import json
 import os
@@ -17,9 +19,13 @@ import subprocess
 import sys
 from collections import defaultdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from provenance import provenance, tell
+
+if TYPE_CHECKING:
+    from gui.lanes.live import LiveSource
 
 FRAMES = 60
 LONGEST = 10.0
@@ -86,14 +92,14 @@ def draw(scale: str) -> None:
     os._exit(0)
 
 
-def record(source) -> None:
+def record(source: LiveSource) -> None:
     """Fill a source with a run of 60 s: sawteeth, pulses, steps of the force."""
     from gui.lanes.expected import Stretch
     from tactile_lab.trace import Trace
 
     rng = np.random.default_rng(2)
     for first in range(0, 60_000, 10_000):
-        time = 1e-3 * np.arange(first, first + 10_000)
+        time = np.float64(1e-3) * np.arange(first, first + 10_000)
         shapes = {
             "V_C1": 1.0 + 0.2 * np.sin(time), "V_C2": np.mod(3 * time, 1.0),
             "V_K": (np.mod(3 * time, 1.0) < 0.02) * 2.0,

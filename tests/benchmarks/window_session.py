@@ -26,7 +26,9 @@ import tempfile
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -54,12 +56,20 @@ LEFT_ALONE = (
 """Buttons that are pressed on purpose, lead out of the window, or move what is kept."""
 
 
+Report = dict[str, Any]
+"""What the program tells every tenth of a second."""
 HEAD = (
     "| seed | s | rounds | keys, clicks, drags | memory in its second quarter, MB "
     "| in its last | longest pause of the window, s | problems |\n"
     "|---|---|---|---|---|---|---|---|"
 )
-NOTHING = {"state": "", "buttons": {}, "open": [], "dialogs": [], "keyboard": ""}
+NOTHING: Report = {
+    "state": "",
+    "buttons": {},
+    "open": [],
+    "dialogs": [],
+    "keyboard": "",
+}
 """What is known before the program has told anything."""
 
 
@@ -74,12 +84,12 @@ class Session:
         self.random = random.Random(seed)
         self.folder = folder
         self.problems: list[str] = []
-        self.reports: list[dict] = []
+        self.reports: list[Report] = []
         self.log: deque[str] = deque(maxlen=LINES)
         self.done: dict[str, int] = {}
         read, write = os.pipe()
         screen = "x".join(map(str, (*SIZE, 24)))
-        self._started = [
+        self._started: list[subprocess.Popen[Any]] = [
             subprocess.Popen(
                 # one that resets refuses who comes as the last client leaves
                 ["Xvfb", "-noreset", "-displayfd", str(write), "-screen", "0", screen],
@@ -118,6 +128,7 @@ class Session:
         self.main = self.main.split()[0]
 
     def _listen(self) -> None:
+        assert self.program.stdout is not None
         for line in self.program.stdout:
             told = json.loads(line)
             if "problem" in told:
@@ -128,11 +139,11 @@ class Session:
                 self.reports.append(told)
 
     @property
-    def now(self) -> dict:
+    def now(self) -> Report:
         """What the program told last."""
         return self.reports[-1] if self.reports else NOTHING
 
-    def wait(self, done, longest: float, what: str) -> None:
+    def wait(self, done: Callable[[], object], longest: float, what: str) -> None:
         end = time.monotonic() + longest
         while not done():
             if self.program.poll() is not None:
@@ -146,7 +157,7 @@ class Session:
                 )
             time.sleep(0.1)
 
-    def tool(self, *arguments: str) -> str:
+    def tool(self, *arguments: str | int) -> str:
         done = subprocess.run(
             ["xdotool", *map(str, arguments)],
             env=self.env, capture_output=True, text=True, timeout=60,
@@ -164,6 +175,7 @@ class Session:
         return bool(place)
 
     def tell(self, word: str) -> None:
+        assert self.program.stdin is not None
         self.program.stdin.write(f"{word}\n")
         self.program.stdin.flush()
 
@@ -242,6 +254,7 @@ class Session:
         A click may come while the scene is still planned, and is lost on the button:
         one that is ready is clicked again.
         """
+        pressed = float("-inf")
 
         def runs() -> bool:
             nonlocal pressed
@@ -316,7 +329,7 @@ class Session:
                 process.wait(30)
 
 
-def lies(reports: list[dict]) -> list[str]:
+def lies(reports: list[Report]) -> list[str]:
     """Where the window said for longer than `LIE` what the source contradicts."""
     found = []
     begun: dict[str, float] = {}

@@ -15,8 +15,16 @@ import threading
 import time
 import traceback
 from pathlib import Path
+from types import TracebackType
+from typing import cast
 
-from PySide6.QtCore import QPoint, QTimer, QtMsgType, qInstallMessageHandler
+from PySide6.QtCore import (
+    QMessageLogContext,
+    QPoint,
+    QTimer,
+    QtMsgType,
+    qInstallMessageHandler,
+)
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QMenu, QWidget
 
@@ -27,8 +35,9 @@ from gui.look.theme import Theme
 from gui.session.log import LogLine
 from gui.session.session import Session
 from gui.window import Window
+from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line import wires
-from sim_backend.serial_line.faults import SerialFault
+from sim_backend.serial_line.faults import Kind, SerialFault
 from tactile_lab.engine.memory import map_large, share_heap
 
 SCENE = """
@@ -62,10 +71,14 @@ def tell(what: object) -> None:
 def listen_to_trouble() -> None:
     """Tell exceptions of all threads, and warnings of Qt with where they came."""
 
-    def failed(kind, error, trace) -> None:
+    def failed(
+        kind: type[BaseException],
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         tell({"problem": "".join(traceback.format_exception(kind, error, trace))})
 
-    def warned(kind, context, text) -> None:
+    def warned(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
         if kind is not QtMsgType.QtDebugMsg and text != DRAGS:
             stack = "".join(traceback.format_stack()[:-1])
             tell({"problem": f"Qt: {text}\n{stack}"})
@@ -78,6 +91,12 @@ def listen_to_trouble() -> None:
 def number(far: wires.FarEnd) -> int:
     """The how many-th far end it is: they are numbered as they are plugged in."""
     return int(far.name.rpartition("-")[2])
+
+
+def source(far: wires.FarEnd) -> SimCoilSource:
+    """The coil source that is the far end."""
+    assert isinstance(far.instrument, SimCoilSource)
+    return far.instrument
 
 
 def named(one: QWidget | None) -> str:
@@ -103,7 +122,8 @@ class Watched:
         fit(self.window, self.window.screen().availableSize())
         self.window.show()
         begin(self.window, str(self.scene), "sim")
-        self._count, self._names, self._newest = 0, {}, 0
+        self._names: dict[str, list[int]] = {}
+        self._count, self._newest = 0, 0
         self._timer = QTimer()
         self._timer.timeout.connect(self._report)
         self._timer.start(100)
@@ -165,7 +185,7 @@ class Watched:
                 "words": stop.words.spoken,
                 "manual": session.manual.alive,
                 "monitor": session.monitor.alive,
-                "output": any(far.instrument.output_on for far in coils),
+                "output": any(source(far).output_on for far in coils),
                 "source": [far.name for far in coils],
                 "open": [named(w) for w in (*cards, *top) if isinstance(w, OPEN)],
                 "dialogs": [named(w) for w in top if isinstance(w, QDialog)],
@@ -179,9 +199,11 @@ class Watched:
     def _act(self, word: str) -> None:
         what, _, kind = word.strip().partition(" ")
         if what == "fault":
-            amount = AMOUNTS.get(kind, 0.0)
+            fault = SerialFault(
+                kind=cast(Kind, kind), times=None, amount=AMOUNTS.get(kind, 0.0)
+            )
             for far in self.coils:
-                far.faults.add(SerialFault(kind=kind, times=None, amount=amount))
+                far.faults.add(fault)
         elif what == "mend":
             for far in self.coils:
                 far.faults.clear()
