@@ -223,6 +223,11 @@ class Circuit(SceneTable):
             return self.V_reset
         return _PUT["V_reset"] if self.firing == "put" else 0.0
 
+    def spike_width(self, threshold: float) -> float:
+        """Time V_K stays above `threshold` V at a spike, s; 0 if it is never there."""
+        height = self.fire_voltage - self.reset_voltage
+        return self.tau_K * math.log(height / threshold) if height > threshold else 0.0
+
     @property
     def reset_time(self) -> float:
         """Time of the reset t_eps, Eq. (11), s."""

@@ -93,12 +93,7 @@ def _exchanged(scene: Scene, needed: Needs) -> Iterator[str]:
 
 def spike_width(scene: Scene) -> float:
     """Time a spike stays above the threshold, s; 0 if it never reaches it."""
-    circuit = scene.circuit
-    height = circuit.fire_voltage - circuit.reset_voltage
-    threshold = threshold_of(scene)
-    if height <= threshold:
-        return 0.0
-    return circuit.tau_K * math.log(height / threshold)
+    return scene.circuit.spike_width(threshold_of(scene))
 
 
 def threshold_of(scene: Scene) -> float:

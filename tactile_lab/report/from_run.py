@@ -76,6 +76,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             circuit=scene.circuit,
             belief=_belief(run, scene),
             compared=scene.compared,
+            counted=_counted(run, scene),
             displaced=scene.displaced,
             listed=played(run),
             lag_uncertainty=scene.bench.magnet.lag_uncertainty,
@@ -99,6 +100,15 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             conditions=_conditions(info) | _said(run.path),
             environment=info.get("environment") or {},
         )
+
+
+def _counted(run: Run, scene: Scene) -> bool:
+    """Whether no spike of the believed circuit fits between two samples of V_K."""
+    detection = run.info.get("detection") or {}
+    if detection.get("signal") != "V_K":
+        return True
+    width = scene.circuit.spike_width(detection["threshold_V"])
+    return bool(width * run.info["sample_rate_Hz"] >= 1)
 
 
 def _belief(run: Run, scene: Scene) -> Belief | None:

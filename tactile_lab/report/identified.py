@@ -101,13 +101,14 @@ def _evidence(run: RunData, names: Sequence[str]) -> Evidence:
     if (
         run.circuit is None
         or run.belief is None
-        or (trace is None and not run.searched)
+        or (trace is None and run.train is None)
     ):
         raise NotIdentifiableError(
-            f"{run.run} has neither V_C1 nor spikes; record V_C1 or V_K"
+            f"{run.run} has neither V_C1 nor all of its spikes; record V_C1, or V_K "
+            "at a rate that misses none"
         )
     believed = run.belief
-    spikes = run.spike_times
+    spikes = run.train
     seen = None
     if trace is not None:
         seen = measured(run, believed, trace)
@@ -138,7 +139,7 @@ def _evidence(run: RunData, names: Sequence[str]) -> Evidence:
         believed.force,
         run.duration,
         V_C1=seen,
-        spike_times=spikes[spikes <= run.duration] if run.searched else None,
+        spike_times=None if spikes is None else spikes[spikes <= run.duration],
         causes=causes,
         moved=moved,
     )

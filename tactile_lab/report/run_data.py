@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tactile_lab.analysis.belief import Belief
+from tactile_lab.arrays import FloatArray
 from tactile_lab.measurement import Measurement
 from tactile_lab.model.state import Start
 from tactile_lab.trial import Protocol
@@ -57,6 +58,8 @@ class RunData(Measurement):
         belief: sensor and bench as they are believed to be, and how well; None where
             the run has no current.
         compared: whether the model is computed and compared with it.
+        counted: whether each spike of the believed circuit lasts for a sample, so that
+            none is missed between two.
         start: voltages the circuit began with; None for the equilibrium.
         asks_I_DS: I_DS was asked for, and is derived from V_C1 where not measured.
         loss: counters, or None where nothing was acquired.
@@ -77,6 +80,7 @@ class RunData(Measurement):
     took: float | None = None
     belief: Belief | None = None
     compared: bool = True
+    counted: bool = True
     start: Start | None = None
     asks_I_DS: bool = True
     loss: Loss | None = None
@@ -87,6 +91,11 @@ class RunData(Measurement):
     sensor: Mapping[str, str] = dataclasses.field(default_factory=dict)
     calibration: Mapping[str, str] = dataclasses.field(default_factory=dict)
     environment: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    @property
+    def train(self) -> FloatArray | None:
+        """Spikes that tell of the circuit, s; None where some, or all, are missed."""
+        return self.spike_times if self.searched and self.counted else None
 
     @property
     def subtitle(self) -> str:

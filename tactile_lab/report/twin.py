@@ -89,7 +89,7 @@ def with_twin(run: RunData) -> tuple[RunData, BesideModel | None]:
             believed,
             run.duration,
             V_C1=next((v for v in voltages if v.signal == "V_C1"), None),
-            spike_times=run.spike_times if run.searched else None,
+            spike_times=run.train,
         ),
     )
     node_a = found.residual("V_C1")

@@ -108,3 +108,15 @@ def test_a_surprise_is_found_out_by_the_report(tmp_path):
     assert found.explanation.cause.name == "input_bias"
     size = found.explanation.cause.size
     assert size.low <= 60e-12 <= size.high
+
+
+def test_spikes_that_a_slow_sampling_misses_are_laid_on_no_cause(tmp_path):
+    """Few samples meet a spike: those missed stood for -3 nA of bias in a report."""
+    slow = {"simulated.deviation": {}, "record.sample_rate": 1e5}
+    scene = load("surprise", {**SHORT, **slow})
+    run = read(Execution(scene, tmp_path).run().folder)
+    found = find(run).beside
+    assert found.twin.spikes.missed > found.twin.spikes.extra == 0
+    assert found.explanation is None
+    V_GS = identify_run(run, ["V_GS"]).estimates["V_GS"]
+    assert V_GS.low < run.circuit.V_GS < V_GS.high
