@@ -14,7 +14,7 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.simulate import Result, simulate
+from tactile_lab.model.simulate import ErrorEstimate, Result, simulate
 from tactile_lab.model.state import Start
 from tactile_lab.waveform import Waveform
 
@@ -115,12 +115,12 @@ class Twin:
     """The model beside one run.
 
     Attributes:
-        result: of the simulation.
+        error: largest that the simulation estimates of itself.
         residuals: per measured voltage.
         spikes: matched, or None where none were measured.
     """
 
-    result: Result
+    error: ErrorEstimate
     residuals: tuple[Residual, ...]
     spikes: Matched | None
 
@@ -164,25 +164,51 @@ def twin(
         keep.append("spikes")
     if not keep:
         raise ParameterError("A twin needs a measured voltage or spikes to compare.")
-    result, *others = (
-        simulate(*each, keep=tuple(keep), until=duration, start=start)
-        for each in (DrivenCircuit(circuit, force), *(moved for _, moved in displaced))
-    )
-    causes = [(name, other) for (name, _), other in zip(displaced, others, strict=True)]
-    predicted = result.spike_times
+    compared = [_within(trace, duration) for trace in voltages]
+
+    def seen(driven: DrivenCircuit) -> _Seen:
+        # one at a time: the whole solution of ten minutes can take 200 MB
+        made = simulate(*driven, keep=tuple(keep), until=duration, start=start)
+        values = [trace.modelled(made) for trace in compared]
+        return _Seen(made.error, made.spike_times, values)
+
+    found = seen(DrivenCircuit(circuit, force))
+    causes = [(name, seen(moved)) for name, moved in displaced]
+    predicted = found.spikes
     matched = None
     if spike_times is not None and predicted is not None:
         matched = match(
             spike_times,
             _streamed(predicted, pauses),
-            [(name, _streamed(o.spike_times, pauses)) for name, o in causes],
+            [(name, _streamed(other.spikes, pauses)) for name, other in causes],
         )
     measured_spikes = np.empty(0) if spike_times is None else np.asarray(spike_times)
     jumps = measured_spikes if predicted is None else np.r_[measured_spikes, predicted]
     residuals = tuple(
-        _residual(result, causes, trace, np.sort(jumps)) for trace in voltages
+        _residual(
+            trace,
+            found.values[i],
+            [(name, other.values[i]) for name, other in causes],
+            np.sort(jumps),
+        )
+        for i, trace in enumerate(compared)
     )
-    return Twin(result, residuals, matched)
+    return Twin(found.error, residuals, matched)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What is compared of one solution: its own error, spikes, means of the bins."""
+
+    error: ErrorEstimate
+    spikes: FloatArray | None
+    values: Sequence[FloatArray]
+
+
+def _within(trace: Measured, duration: float) -> Measured:
+    """The bins of the run."""
+    inside = (trace.time >= 0) & (trace.time <= duration)
+    return replace(trace, time=trace.time[inside], value=trace.value[inside])
 
 
 def _streamed(
@@ -196,14 +222,12 @@ def _streamed(
 
 
 def _residual(
-    result: Result,
-    causes: Sequence[tuple[str, Result]],
     trace: Measured,
+    predicted: FloatArray,
+    causes: Sequence[tuple[str, FloatArray]],
     jumps: FloatArray,
 ) -> Residual:
-    inside = (trace.time >= 0) & (trace.time <= result.duration)
-    trace = replace(trace, time=trace.time[inside], value=trace.value[inside])
-    time, predicted = trace.time, trace.modelled(result)
+    time = trace.time
     difference = trace.value - predicted
     if trace.signal == "V_C2" and jumps.size and time.size > 1:
         half = float(np.median(np.diff(time)))
@@ -211,9 +235,7 @@ def _residual(
         near = np.minimum(after, jumps.size - 1)
         hit = (after < jumps.size) & (jumps[near] <= time + half)
         difference = np.where(hit, np.nan, difference)
-    moved = (
-        (name, (trace.modelled(other) - predicted) / PART) for name, other in causes
-    )
+    moved = ((name, (other - predicted) / PART) for name, other in causes)
     channel = (
         (name, np.full(time.size, volts))
         for name, volts in (("follower", trace.offset), ("codes", trace.resolution))

@@ -27,7 +27,7 @@ def spike_time_budget(twin: Twin, belief: Belief) -> ErrorBudget | None:
     if matched is None or not matched.offsets.size:
         return None
     noise = matched.scatter
-    return _budget("s", matched.open, twin.result.error.spike_time, noise, belief)
+    return _budget("s", matched.open, twin.error.spike_time, noise, belief)
 
 
 def V_C1_budget(twin: Twin, belief: Belief) -> ErrorBudget | None:
@@ -41,7 +41,7 @@ def V_C1_budget(twin: Twin, belief: Belief) -> ErrorBudget | None:
     noise = float(
         np.hypot(irregularity(residual.difference), _of(residual.open, "codes"))
     )
-    return _budget("V", residual.open, twin.result.error.V_C1, noise, belief)
+    return _budget("V", residual.open, twin.error.V_C1, noise, belief)
 
 
 def _budget(

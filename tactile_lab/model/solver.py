@@ -74,7 +74,8 @@ def solve(
     spikes = rows = found
     if need.dense:
         count = int(S[spiking.COUNT]) if "spikes" in need.signals else 0
-        spikes, rows = found[:count], found[count:]
+        # a copy: who keeps the spikes, a few, would keep all rows, up to a GB, with them
+        spikes, rows = found[:count].copy(), found[count:]
     return Solution(circuit, need, force, state, until, spikes, par, rows, S)
 
 

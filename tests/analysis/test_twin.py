@@ -84,7 +84,7 @@ def test_the_firing_stage_is_left_out_where_nothing_needs_it():
     trace, _ = measured(Circuit())
     found = twin(Circuit(), FORCE, FORCE.end, voltages=[trace])
     assert found.spikes is None
-    assert found.result.spike_times is None
+    assert found.error.spike_time is None
 
 
 def test_a_twin_needs_something_to_compare():
