@@ -131,7 +131,7 @@ class ResultsView(QWidget):
         column(self._facts, self._facts_text, margin=10)
         self._facts.hide()
         self.report = push("")
-        self.report.hide()
+        self.show_report("")
         self.report.clicked.connect(self.report_asked)
         self._set_up_table()
         head = row(self._title, STRETCH, self.mark)
@@ -287,6 +287,7 @@ class ResultsView(QWidget):
     def show_report(self, offer: str, *, ready: bool = True) -> None:
         """Show what can be done about the report, if it can be by now; "": nothing."""
         self.report.setText(offer)
+        self.report.setAccessibleName(offer or "Report")
         self.report.setVisible(bool(offer))
         self.report.setEnabled(ready)
 
