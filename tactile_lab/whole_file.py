@@ -60,9 +60,14 @@ def replacing(path: Path, size: int = 0, *, lasting: bool = False) -> Iterator[P
         lasting: wait until the disk has it, so that a power cut leaves it whole, too.
 
     Raises:
-        RecordingError: that many are not free.
+        RecordingError: that many are not free, or a device or pipe has that name.
         OSError: it cannot be written.
     """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise RecordingError(
+            f"{path} is a device or a pipe; a file in its place would end it. "
+            "Give another name."
+        )
     path.parent.mkdir(parents=True, exist_ok=True)
     check_space(path.parent, size)
     part = path.with_name(f".{path.stem}.part{path.suffix}")

@@ -1,5 +1,6 @@
 """Outputs are whole or as they were, on a disk that fills up while they are written."""
 
+import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -9,11 +10,12 @@ from full_disk import full_after
 
 from gui.setup.presets import save_preset
 from tactile_lab.commands import validate
-from tactile_lab.errors import TactileLabError
+from tactile_lab.errors import RecordingError, TactileLabError
 from tactile_lab.scene.load import load
 from tactile_lab.scene.write_bench import write_bench
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.validation.accuracy import COLUMNS, write_csv
+from tactile_lab.whole_file import write_text
 
 BENCH = Path("tactile_lab/scene/simulated_bench.toml").read_text(encoding="utf-8")
 
@@ -57,3 +59,13 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path, write) -> None:
 
 def test_what_is_written_is_there() -> None:
     assert len(",".join(COLUMNS)) > 50, "the disk is full before its first line ends"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="POSIX pipes")
+def test_no_file_takes_the_place_of_a_device_or_a_pipe(tmp_path):
+    """A figure for /dev/full became a file of that name, and the device was gone."""
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(RecordingError, match="a device or a pipe"):
+        write_text(tmp_path / "pipe", "text")
+    assert (tmp_path / "pipe").is_fifo()
+    assert len(list(tmp_path.iterdir())) == 1

@@ -74,7 +74,7 @@ def solve(
     spikes = rows = found
     if need.dense:
         count = int(S[spiking.COUNT]) if "spikes" in need.signals else 0
-        # a copy: who keeps the spikes, a few, would keep all rows, up to a GB, with them
+        # a copy: who keeps the spikes, a few, would keep all rows, up to a GB, too
         spikes, rows = found[:count].copy(), found[count:]
     return Solution(circuit, need, force, state, until, spikes, par, rows, S)
 
