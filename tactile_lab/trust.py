@@ -99,7 +99,8 @@ def _code(held: Any) -> Iterator[str]:
             for key, value in held.items():
                 if key == "library" and isinstance(value, str):
                     yield value  # however it ends
-                yield from _code(value)
+                else:
+                    yield from _code(value)
         case list() | tuple():
             for value in held:
                 yield from _code(value)

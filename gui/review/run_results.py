@@ -19,14 +19,12 @@ from tactile_lab.acquisition.events import RunState
 from tactile_lab.engine.engine import Reply
 from tactile_lab.errors import RunFolderError
 from tactile_lab.measurement import MeasuredTrial
-from tactile_lab.store.folder import DATA
+from tactile_lab.store.folder import DATA, REPORT
 from tactile_lab.trial import Outcome
 
 if TYPE_CHECKING:
     from gui.lanes.stored import RunSource
     from tactile_lab.acquisition.ending import Executed
-
-REPORT = "report.html"
 
 
 class RunResults(QObject):

@@ -30,6 +30,7 @@ from tactile_lab.engine.jobs import follow_run, write_report
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
 from tactile_lab.quantity import looked_for, show
+from tactile_lab.store.folder import REPORT
 
 if TYPE_CHECKING:
     from gui.session.expectation import Expectation
@@ -263,7 +264,7 @@ class LiveRun(LiveTask):
         """
         if folder in self.reporting:
             self._outdated.add(folder)
-        elif (folder / "report.html").exists():
+        elif (folder / REPORT).exists():
             self._write_report(folder, lambda: None)
 
     def hasten(self) -> None:
@@ -291,9 +292,7 @@ class LiveRun(LiveTask):
             words = f"No new report of {folder.name}: {problem}. {AGAIN}"
             self._log.add(Severity.WARNING, "report", words)
         else:
-            self._log.add(
-                Severity.GOOD, "report", f"Report in {folder / 'report.html'}"
-            )
+            self._log.add(Severity.GOOD, "report", f"Report in {folder / REPORT}")
         then()
         if folder in self._outdated:
             self._outdated.discard(folder)

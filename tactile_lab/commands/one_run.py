@@ -319,9 +319,11 @@ def caught_up(folder: Path, *, no_report: bool) -> bool:
 
     Nothing that fails in here is more than told; False where a signal cut it short.
     """
+    from tactile_lab.store.folder import REPORT
+
     with interrupted():
         try:
-            if not no_report and not (folder / "report.html").exists():
+            if not no_report and not (folder / REPORT).exists():
                 write_report(folder)
             _follow(folder)
         except (Exception, KeyboardInterrupt) as failure:

@@ -12,6 +12,7 @@ from tactile_lab.report.findings import Findings, find
 from tactile_lab.report.page import page
 from tactile_lab.report.results import as_json
 from tactile_lab.report.run_data import RunData
+from tactile_lab.store.folder import REPORT
 from tactile_lab.store.progress import Progress, counted, nothing, share
 from tactile_lab.whole_file import replacing, write_text
 
@@ -73,7 +74,7 @@ def write(
                 raise
             said = f"No plot {plot.name!r}: it cannot be drawn ({error})"
             findings = replace(findings, missing=(*findings.missing, said))
-    html = folder / "report.html"
+    html = folder / REPORT
     write_text(html, page(findings, pictures))
     return Report(
         findings=findings,

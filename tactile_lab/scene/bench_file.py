@@ -41,8 +41,14 @@ def is_file(value: object) -> bool:
     return isinstance(value, str) and value.endswith((".toml", ".py"))
 
 
-def _located(name: str, info: ValidationInfo) -> str:
+def _folder(info: ValidationInfo) -> Path | None:
+    """Where the bench file lies; None where paths stay as they are."""
     folder: Path | None = (info.context or {}).get("folder", Path())
+    return folder
+
+
+def _located(name: str, info: ValidationInfo) -> str:
+    folder = _folder(info)
     return str((folder / name).resolve()) if folder and is_file(name) else name
 
 
@@ -52,9 +58,10 @@ Located = AfterValidator(_located)
 
 def _beside(library: str, info: ValidationInfo) -> str:
     """A library beside the bench file; another name is the loader's to find."""
-    folder: Path | None = (info.context or {}).get("folder", Path())
-    path = folder / library if folder is not None else None
-    return str(path.resolve()) if path is not None and path.exists() else library
+    folder = _folder(info)
+    if folder is None or not (folder / library).exists():
+        return library
+    return str((folder / library).resolve())
 
 
 SCHEMES = ("socket", "rfc2217", "spy", "hwgrep", "loop", "alt", "cp2110", "sim")

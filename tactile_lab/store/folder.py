@@ -27,7 +27,7 @@ SEAL = "sha256"
 CHANGED = "changed_before_recovery"
 """Key of `run.json`: its hash was wrong when the run was recovered."""
 
-DATA, LOG, SCENE = "data.h5", "log.jsonl", "scene.toml"
+DATA, LOG, SCENE, REPORT = "data.h5", "log.jsonl", "scene.toml", "report.html"
 
 INPUTS = "inputs"
 """Folder within a run for copies of what it was made from."""

@@ -143,12 +143,17 @@ def test_a_run_seen_whole_has_values_though_its_record_ends_before_it(ends, told
     assert found == ((1.25,) if told else (None,))
 
 
-def test_force_is_read_where_its_lane_ends_though_the_scope_was_unplugged() -> None:
-    """It said 120.0 mN beside a line that had fallen to 0."""
-    source = LiveSource(None, 0.12)
-    flat = np.full(3000, 1.25)
+def _sampled() -> tuple[LiveSource, Trace]:
+    """A source with 3 s of V_C1, and these."""
+    source, flat = LiveSource(None, 0.12), np.full(3000, 1.25)
     bins = Trace.bins(np.arange(3000) * 1e-3, flat, flat, flat, 1e-3)
     source.add_bins({"V_C1": bins})
+    return source, bins
+
+
+def test_force_is_read_where_its_lane_ends_though_the_scope_was_unplugged() -> None:
+    """It said 120.0 mN beside a line that had fallen to 0."""
+    source, _ = _sampled()
     for time, current in ((0.0, 1.0), (3.4, 0.0)):
         source.add_current(time, current)
     assert _right(source, "force") == 0.12e3, "the run goes on: it is behind the coil"
@@ -158,10 +163,7 @@ def test_force_is_read_where_its_lane_ends_though_the_scope_was_unplugged() -> N
 
 def test_what_a_meter_reads_is_read_where_its_own_lane_ends() -> None:
     """Not where samples end: a teslameter goes on as the scope is unplugged."""
-    source = LiveSource(None, 0.12)
-    flat = np.full(3000, 1.25)
-    bins = Trace.bins(np.arange(3000) * 1e-3, flat, flat, flat, 1e-3)
-    source.add_bins({"V_C1": bins})
+    source, _ = _sampled()
     source.add_current(6.0, 0.0)
     for time, tesla, kelvin in ((2.0, 0.2, 295.0), (5.0, 0.1, 296.0)):
         source.add_field(time, tesla)
@@ -171,10 +173,7 @@ def test_what_a_meter_reads_is_read_where_its_own_lane_ends() -> None:
 
 
 def test_a_residual_is_read_where_the_model_has_come_to() -> None:
-    source = LiveSource(None, 0.12)
-    flat = np.full(3000, 1.25)
-    bins = Trace.bins(np.arange(3000) * 1e-3, flat, flat, flat, 1e-3)
-    source.add_bins({"V_C1": bins})
+    source, bins = _sampled()
     model = bins[:2800]
     source.model.add(ModelPart({"V_C1": model}, np.empty(0), model.end))
     source.running = False
