@@ -12,13 +12,16 @@ from gui.screen.screen import Screen
 from gui.session.session import BY_HAND, MONITOR
 
 FAST, SLOW = 33, 100
-"""Milliseconds between frames."""
+"""Milliseconds between frames, at least and at most."""
 
 NUMBERS = 0.1
 """Seconds between updates of the numbers: faster cannot be read."""
 
-BUDGET = 0.6
-"""Share of the interval a frame may cost before the interval is doubled."""
+BUDGET = 0.3
+"""Share of a core that this thread may take before frames come less often."""
+
+USUAL, STEP = 0.1, 2
+"""Weight of the newest frame in the usual cost; finest change of the interval, ms."""
 
 UNKEPT = {
     MONITOR: "Monitor: only Record keeps what is seen",
@@ -28,7 +31,7 @@ UNKEPT = {
 
 
 class FrameLoop(QObject):
-    """Moves what is on screen; `costs` holds the newest frame costs, s."""
+    """Moves what is on screen."""
 
     told = Signal(object)
     """The newest snapshot, as often as numbers can be read."""
@@ -37,8 +40,8 @@ class FrameLoop(QObject):
         super().__init__(panels.centre)
         self._panels, self._screen = panels, screen
         self.frozen = False
-        self.costs: list[float] = []
         self._numbers = 0.0
+        self._used, self._usual = time.thread_time(), 0.0
         self._timer = QTimer(self)
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self.tick)
@@ -54,13 +57,18 @@ class FrameLoop(QObject):
             self._panels.centre.stack.exchange_source(shown)
             self._show_newest(shown)
 
+    @property
+    def interval(self) -> int:
+        """From one frame to the next, ms."""
+        return self._timer.interval()
+
     def stop(self) -> None:
         """End the loop."""
         self._timer.stop()
 
     def tick(self) -> None:
         """One frame."""
-        begun = time.perf_counter()
+        self._keep_budget()
         panels, session = self._panels, self._panels.session
         told = session.poll()
         for stop in panels.stops:
@@ -73,7 +81,6 @@ class FrameLoop(QObject):
         if now - self._numbers >= NUMBERS:
             self._numbers = now
             self._show_numbers()
-        self._keep_budget(time.perf_counter() - begun)
 
     def _show_newest(self, source: LiveSource) -> None:
         centre = self._panels.centre
@@ -117,14 +124,13 @@ class FrameLoop(QObject):
         seen = panels.centre.stack.source.of is monitor.source
         panels.review.show_monitor(on=monitor.alive or seen)
 
-    def _keep_budget(self, cost: float) -> None:
-        self.costs.append(cost)
-        del self.costs[:-600]
-        recent = self.costs[-20:]
-        mean = sum(recent) / len(recent)
-        interval = self._timer.interval()
-        if mean > BUDGET * interval / 1e3 and interval < SLOW:
-            self._timer.setInterval(min(2 * interval, SLOW))
-            self.costs.clear()
-        elif mean < 0.2 * BUDGET * interval / 1e3 and interval > FAST:
-            self._timer.setInterval(FAST)
+    def _keep_budget(self) -> None:
+        """Come as often as the budget allows: painting counts, waiting does not."""
+        used = time.thread_time()
+        cost = min(used - self._used, SLOW / 1e3)  # one that hung is not usual
+        self._used = used
+        self._usual += USUAL * (cost - self._usual)
+        wanted = round(min(max(1e3 * self._usual / BUDGET, FAST), SLOW))
+        # to set it begins the interval anew
+        if abs(wanted - self.interval) >= STEP:
+            self._timer.setInterval(wanted)

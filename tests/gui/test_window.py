@@ -2,6 +2,7 @@
 
 import gc
 import sys
+import time
 from itertools import product
 
 import pytest
@@ -161,6 +162,26 @@ def test_lanes_are_painted_where_something_was_told(lab) -> None:
     lab.until(lambda: painted)
     window.centre.stack.scene.drawn.disconnect(noted)
     session.source = None
+
+
+def test_frames_leave_the_processor_to_the_run(lab) -> None:
+    """Only the poll was counted, not the painting, and by a clock that others slow."""
+    frames, scene = lab.window.frames, lab.window.centre.stack.scene
+
+    def paint_long() -> None:
+        end = time.thread_time() + 0.06
+        while time.thread_time() < end:
+            pass
+
+    noted = scene.drawn.connect(paint_long)
+
+    def costly() -> bool:
+        scene.refresh()
+        return frames.interval == 100
+
+    lab.until(costly)
+    scene.drawn.disconnect(noted)
+    lab.until(lambda: frames.interval < 60)
 
 
 def test_the_wheel_changes_no_choice(lab) -> None:
