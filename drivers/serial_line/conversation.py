@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from typing import Generic, TypeVar
 
+from drivers.serial_line import failures
 from drivers.serial_line.link import SerialLink
 from tactile_lab.errors import (
     BadReplyError,
@@ -161,13 +162,11 @@ class Conversation(Generic[D]):
         try:
             return self.link.query(line, blank=blank)
         except NoReplyError as reason:
-            if not reported:
+            if self.link.half_sent:
                 raise
-            raise NoReplyError(
-                f"The {self.dialect.role} at {self.link.port} did not answer {line!r} "
-                f"and reports {', '.join(reported)}. Look at its front panel: somebody "
-                "may have switched something there."
-            ) from reason
+            link, wait = self.link, self.link.wire.timeout
+            told = failures.unanswered(link.what, link.port, line, wait, reported)
+            raise NoReplyError(told) from reason
 
     def number(self, line: str, pattern: str | None = None) -> float:
         """The numeric answer to `line`: group 1 of `pattern`, or of the row's.

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import serial
 
+from drivers.serial_line import failures
 from drivers.serial_line.port import PORT_ERRORS, open_port, release, send_on
 from drivers.serial_line.port_names import PortNames
 from drivers.serial_line.transcript import Transcript
@@ -33,6 +34,10 @@ GAP_MARGIN = 0.005
 
 LONGEST_LATE = 4096
 """Bytes without an end that are still taken once the time for an answer is over."""
+
+LATEST = 1.0
+"""How late an answer may come and the link still be brought in step, s: for as long the
+guard lets a program be silent, too."""
 
 LONGEST_DRAIN = 1.0
 """Longest time a far end may keep talking while the line is drained, s."""
@@ -69,6 +74,8 @@ class SerialLink:
 
     Attributes:
         port: where it is, or is looked for next.
+        what: the instrument's role, for messages.
+        half_sent: it took no more characters in the midst of a line.
         names: by which it may be found.
     """
 
@@ -88,7 +95,7 @@ class SerialLink:
         self.wire = wire
         self.identity: str | None = None
         self._clock = clock
-        self._what = what
+        self.what = what
         self._identify = identify
         self.spy = spy
         self._beat = beat
@@ -97,8 +104,11 @@ class SerialLink:
         self._sent = 0.0
         self._free_at = 0.0
         self._doubtful = False
-        self._half_sent = False
+        self.half_sent = False
         self._names_due = 0
+        self._asked = identify
+        self._patient = True
+        """No late answer was waited for since the last one in time."""
         self._echoes: list[str] = []
         """Lines without an answer whose echo comes before the next answer."""
 
@@ -118,7 +128,7 @@ class SerialLink:
         """
         if self._serial is not None:
             return
-        self._serial = open_port(self.port, self.wire, self._what)
+        self._serial = open_port(self.port, self.wire, self.what)
         try:
             self._echoes.clear()
             with self._mapped():
@@ -138,7 +148,7 @@ class SerialLink:
         if self.port == self.names.named:
             return ""
         return (
-            f"The {self._what} is at {os.path.realpath(self.port)} now, no longer at "
+            f"The {self.what} is at {os.path.realpath(self.port)} now, no longer at "
             f'{self.names.named}: cables were pulled. Write port = "{self.port}" into '
             "the bench file, a name that stays."
         )
@@ -180,7 +190,10 @@ class SerialLink:
             BadReplyError: bytes that are no text.
         """
         self._settle()
-        return self._exchange(line, blank)
+        self._asked = line
+        answer = self._exchange(line, blank)
+        self._patient = True
+        return answer
 
     def record(self, path: Path) -> None:
         """Write every byte from now on to a transcript at `path`, until closed.
@@ -188,7 +201,7 @@ class SerialLink:
         Raises:
             SceneError: the file cannot be written.
         """
-        self.spy = self._transcript = Transcript(path, about=self._what)
+        self.spy = self._transcript = Transcript(path, about=self.what)
 
     def send_blindly(self, line: str) -> None:
         """Send `line` behind a terminator that ends a half-sent one; expect nothing.
@@ -219,6 +232,9 @@ class SerialLink:
     def resynchronise(self) -> None:
         """Drain the line and have the instrument say its name again.
 
+        It is asked until an answer would be `LATEST` s late, but once where nothing
+        came in time since that was last done.
+
         Raises:
             LinkLostError: unplugged.
             NoReplyError: it does not answer.
@@ -229,9 +245,11 @@ class SerialLink:
         self.drain()
         self._send_preamble()
         answer = ""
+        begun = self._clock.now()
+        patience, self._patient = LATEST if self._patient else 0.0, False
         for _ in range(3):
             try:
-                answer = self._ask_name()
+                answer = self._name_since(begun, patience)
             except BadReplyError as reason:
                 answer = str(reason)
             if answer == self.identity:
@@ -240,13 +258,28 @@ class SerialLink:
             self._doubtful = True
             self.drain()
         raise BadReplyError(
-            f"The {self._what} at {self.port} answers {answer!r} to {self._identify}, "
+            f"The {self.what} at {self.port} answers {answer!r} to {self._identify}, "
             f"not {self.identity!r} as before. Check what is connected there."
         )
 
     def _ask_name(self) -> str:
         self._names_due += 1
         return self._exchange(self._identify)
+
+    def _name_since(self, begun: float, patience: float) -> str:
+        """Its name, asked for since `begun` s, for as long as `patience`, s."""
+        while True:
+            try:
+                return self._ask_name()
+            except NoReplyError as reason:
+                if self.half_sent:
+                    raise
+                waited = self._clock.now() - begun
+                if waited >= patience:
+                    asked, name = self._asked, self._identify
+                    raise NoReplyError(
+                        failures.silence(self.what, self.port, asked, name, waited)
+                    ) from reason
 
     def _has_said_its_name(self) -> None:
         """Let no second answer come later, where it was asked more than once."""
@@ -278,7 +311,7 @@ class SerialLink:
                 quiet_since = now
             if now > give_up:
                 raise BadReplyError(
-                    f"The {self._what} at {self.port} does not stop talking; its "
+                    f"The {self.what} at {self.port} does not stop talking; its "
                     "baud rate or its model is probably not the one expected."
                 )
             self._clock.sleep_until(now + quiet / 4)
@@ -300,7 +333,7 @@ class SerialLink:
             repeated = self._receive(sent)
             if repeated != sent:
                 raise BadReplyError(
-                    f"The {self._what} at {self.port} answered {repeated!r} where it "
+                    f"The {self.what} at {self.port} answered {repeated!r} where it "
                     f"was to repeat {sent!r}. Leave echo out of its dialect row if it "
                     "has none or it is switched off; else check baud rate and cable."
                 )
@@ -308,14 +341,14 @@ class SerialLink:
         answer = self._receive(line, blank)
         if answer == line:
             raise BadReplyError(
-                f"The {self._what} at {self.port} echoes what it is sent. Switch its "
+                f"The {self.what} at {self.port} echoes what it is sent. Switch its "
                 "echo off, or set echo = true in its dialect row."
             )
         self._doubtful = False
         return answer
 
     def _send_preamble(self) -> None:
-        if self.wire.preamble or self._half_sent:
+        if self.wire.preamble or self.half_sent:
             self._send(self.wire.preamble)
             if self.wire.echo:
                 self.drain()
@@ -324,17 +357,17 @@ class SerialLink:
         data = (line + self.wire.send_end).encode("ascii")
         if len(data) > self.wire.max_line:
             raise InstrumentError(
-                f"{line!r} has {len(data)} characters; the {self._what} takes "
+                f"{line!r} has {len(data)} characters; the {self.what} takes "
                 f"{self.wire.max_line} a line."
             )
         self._clock.sleep_until(self._free_at)
         self._beat()
         self._tell(">", data)
-        self._half_sent = True
+        self.half_sent = True
         begun = self._clock.now()
         with self._mapped() as port:
             port.write(data)
-        self._half_sent = False
+        self.half_sent = False
         # a port takes all characters at once and sends them one by one
         sent = begun + len(data) * self.wire.character_time
         self._sent = max(sent, self._clock.now())
@@ -366,54 +399,35 @@ class SerialLink:
             if line:
                 self._tell("<", line)
             if not line.endswith(end):
-                got = f"only {line!r}" if line else "nothing"
                 raise NoReplyError(
-                    f"The {self._what} at {self.port} answered {got} to {asked!r} "
-                    f"within {self.wire.timeout:g} s. Check power, cable, "
-                    + (
-                        "terminator, and that no other program is connected there."
-                        if self.port.startswith("socket:")
-                        else "baud rate and terminator."
+                    failures.no_answer(
+                        self.what, self.port, asked, line, self.wire.timeout
                     )
                 )
             text = line.translate(None, self.wire.strip.encode("ascii")).rstrip(b"\r\n")
             if not text and not blank:
                 continue
             if not all(0x20 <= byte < 0x7F for byte in text):
-                raise self._bad(asked, line)
+                self._doubtful = True
+                raise BadReplyError(failures.no_text(self.what, self.port, asked, line))
             return text.decode("ascii").strip()
-
-    def _bad(self, asked: str, line: bytes) -> BadReplyError:
-        self._doubtful = True
-        return BadReplyError(
-            f"The {self._what} at {self.port} answered {line!r} to {asked!r}, which is "
-            "no text of its dialect. Check "
-            + (
-                "its terminator, and that the port is that of its text commands."
-                if self.port.startswith("socket:")
-                else "baud rate, parity and cable."
-            )
-        )
 
     @contextmanager
     def _mapped(self) -> Iterator[serial.Serial]:
         """The open port, with what pyserial raises told as our errors."""
         if self._serial is None:
-            raise LinkLostError(f"The {self._what} at {self.port} is not connected.")
+            raise LinkLostError(f"The {self.what} at {self.port} is not connected.")
         try:
             yield self._serial
         except serial.SerialTimeoutException as reason:
             self._doubtful = True
             raise NoReplyError(
-                f"The {self._what} at {self.port} takes no more characters; it hangs, "
+                f"The {self.what} at {self.port} takes no more characters; it hangs, "
                 "or holds the line by flow control."
             ) from reason
         except PORT_ERRORS as reason:
             self._doubtful = True
-            raise LinkLostError(
-                f"The link to the {self._what} at {self.port} was lost ({reason}). "
-                "Check cable and power."
-            ) from reason
+            raise LinkLostError(failures.lost(self.what, self.port, reason)) from reason
 
     def _tell(self, direction: str, data: bytes) -> None:
         if self.spy is not None:

@@ -37,6 +37,10 @@ ROUNDED = 0.6
 """Of a source's smallest step: what it rounds to lies no farther."""
 
 
+OVERDUE = 2
+"""Promised exchanges after which an answer is waited for before a trial is judged."""
+
+
 ACTS = 0.76
 """Part of an exchange after which a source acts: a line is longer than its answer."""
 
@@ -152,6 +156,20 @@ class CoilThread(InstrumentThread):
         self.generator: GeneratorPlayer | None = None
         self.plays_list = False
         self._passed = 0
+        self._asked: float | None = None
+        """When it began what the source has not answered yet, clock time, s."""
+
+    @property
+    def answered(self) -> bool:
+        """Whether the source owes no answer."""
+        return self._asked is None
+
+    @property
+    def overdue(self) -> bool:
+        """Whether the source owes an answer for so long that it may be gone."""
+        asked = self._asked
+        longest = OVERDUE * max(self.coil.update_interval, self._promised)
+        return asked is not None and self.clock.now() - asked > longest
 
     @property
     def state(self) -> CoilState:
@@ -225,7 +243,9 @@ class CoilThread(InstrumentThread):
                 self._watch(self.list, self.clock.now())
             now = self.clock.now()
             if self._waveform is not None and now >= self._next:
+                self._asked = now
                 self._update(self._waveform, now)
+                self._asked = None
             self.clock.wait_for(self._called, self._wake())
 
     def make_safe_and_close(self) -> None:

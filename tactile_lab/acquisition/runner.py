@@ -167,6 +167,8 @@ class Runner:
         finally:
             trials.close()
         self._pump.stop_stream()
+        if (coil := self.instruments.coil) is not None:
+            self._pump.until(lambda: coil.answered)
 
     def _play(self, index: int, trial: Trial) -> Outcome:
         """Play one trial while everything streams."""
@@ -207,7 +209,7 @@ class Runner:
         if asked is not None:
             self._ask_field(asked, trial, start)
         if coil is not None:  # its last point is 0 A and may outlast the trial
-            self._pump.until(lambda: not coil.plays_list)
+            self._pump.until(lambda: not (coil.plays_list or coil.overdue))
         self._note_edges(shown)
         current = self._account.applied_since(begin)
         self._compare(trial, start, shown, current)

@@ -41,6 +41,8 @@ def run(folder: Path, fault: SerialFault) -> tuple[Executed, int]:
     "fault",
     [
         SerialFault(kind="late", amount=0.25, line=PULSE),
+        SerialFault(kind="late", amount=1.0, line=PULSE),
+        SerialFault(kind="late", amount=1.0, line="^SYST:ERR"),
         SerialFault(kind="missing", line=PULSE),
         SerialFault(kind="partial", amount=5, line=PULSE),
         SerialFault(kind="garbled", line=PULSE),
@@ -74,7 +76,7 @@ def test_set_points_that_came_too_late_are_told_and_stored(tmp_path: Path) -> No
     ("fault", "reason"),
     [
         (SerialFault(kind="refused", line=PULSE), "-222"),
-        (SerialFault(kind="late", amount=1.0, line=PULSE), "answered nothing"),
+        (SerialFault(kind="late", amount=3.0, line=PULSE), "answered nothing"),
         (SerialFault(kind="unplug", amount=0.6, line=PULSE), "was lost"),
         (SerialFault(kind="unplug", amount=0.6, line=PULSE, form="closed"), "was lost"),
         (SerialFault(kind="unplug", amount=0.6, line=PULSE, form="reset"), "was lost"),
