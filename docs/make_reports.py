@@ -10,6 +10,7 @@ the code it measures since.
 
 from __future__ import annotations
 
+import argparse
 import json
 import re
 import shutil
@@ -134,10 +135,17 @@ def pages() -> str:
 
 def main() -> None:
     """Say how long it takes, then do what is left."""
-    if "--pages" in sys.argv:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("words", nargs="*", help=f"of these: {', '.join(STEPS)}")
+    parser.add_argument("--pages", action="store_true", help="measure nothing")
+    asked = parser.parse_args()
+    if asked.pages:
         print(pages())
         return
-    version, words = commit(), sys.argv[1:]
+    version, words = commit(), asked.words
+    for word in words:
+        if not any(word in name for name in STEPS):
+            parser.error(f"no campaign's name has {word!r} in it")
     known = json.loads(DONE.read_text()) if DONE.exists() else {}
     wanted = [n for n in STEPS if not words or any(word in n for word in words)]
     left = []
