@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, cast
 from unittest.mock import patch
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -185,7 +185,8 @@ def _image(seen: QImage) -> Image.Image:
 def _in_256_colours(picture: Image.Image) -> Image.Image:
     """The commonest as they are, for what is flat, and some for all other hues."""
     found = picture.getcolors(1 << 24) or []
-    common = [part for _, colour in sorted(found)[:-193:-1] for part in colour]
+    ranked = sorted(cast(list[tuple[int, tuple[int, int, int]]], found))
+    common = [part for _, colour in ranked[:-193:-1] for part in colour]
     others = picture.quantize(64, Image.Quantize.MAXCOVERAGE).getpalette() or []
     palette = Image.new("P", (1, 1))
     palette.putpalette([*common, *others[:192]])

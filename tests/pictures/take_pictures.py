@@ -114,9 +114,10 @@ def _old_run(stage: Stage, folder: Path) -> None:
     """A run from disk where its strongest step begins to fire."""
     window, before = stage.window, stage.window.screen_.run
     window.screen_.open_run(folder)
-    stage.until(lambda: (run := window.screen_.run) is not before and run.has_model)
+    stage.until(lambda: window.screen_.run not in (None, before))
     run = window.screen_.run
     assert run is not None
+    stage.until(lambda: run.has_model)
     step = [one for one in run.holds if not one.pause][-1]
     first = float(run.spikes[run.spikes > step.start][0])
     window.centre.view.show_span(first - 0.15, 0.8)

@@ -23,16 +23,16 @@ LEFT = Qt.MouseButton.LeftButton
 
 
 @pytest.fixture
-def stack(app) -> Iterator[LaneStack]:
+def stack(app: QApplication) -> Iterator[LaneStack]:
     """Four lanes with 20 s of a slow sine, two steps and a spike each second."""
     made = LaneStack(TimeView(), Theme("light"))
     made.show_lanes(lanes_for(("force", "V_C1", "V_K", "spikes"), twin=False))
     made.resize(900, 600)
     made.show()
     source = LiveSource(None, 0.2)
-    time = 1e-3 * np.arange(20_000)
+    time = np.arange(20_000) / 1e3
     for signal in ("V_C1", "V_K"):
-        mean = np.sin(time).astype(np.float32)
+        mean = np.sin(time)
         bins = Trace.bins(time, mean - 0.01, mean + 0.01, mean, 1e-3)
         source.add_bins({signal: bins})
     source.add_spikes(tuple(np.arange(1.0, 20.0).tolist()))
@@ -88,7 +88,7 @@ def drag(stack: LaneStack, a: QPoint, b: QPoint) -> None:
     """With the button held in between, as a hand does it."""
     QTest.mousePress(stack.scene.viewport(), LEFT, pos=a)
     for share in (0.3, 0.6, 1.0):
-        move(stack, QPointF(a) + share * QPointF(b - a), LEFT)
+        move(stack, QPointF(a) + QPointF(b - a) * share, LEFT)
     QTest.mouseRelease(stack.scene.viewport(), LEFT, pos=b)
 
 
@@ -97,17 +97,17 @@ def span(lane: LaneBox) -> float:
     return high - low
 
 
-def menu_of(app, stack: LaneStack, at: QPoint) -> QMenu:
+def menu_of(app: QApplication, stack: LaneStack, at: QPoint) -> QMenu:
     QTest.mousePress(stack.scene.viewport(), Qt.MouseButton.RightButton, pos=at)
     QTest.mouseRelease(stack.scene.viewport(), Qt.MouseButton.RightButton, pos=at)
     (menu,) = (m for m in stack.findChildren(QMenu) if m.isVisible())
     return menu
 
 
-def choose(app, stack: LaneStack, key: str, words: str) -> None:
+def choose(app: QApplication, stack: LaneStack, key: str, words: str) -> None:
     menu = menu_of(app, stack, middle(stack, key))
     found = [a for a in menu.actions() if a.text() == words]
-    for one in (a.menu() for a in menu.actions() if a.menu()):
+    for one in menu.findChildren(QMenu):
         found += [a for a in one.actions() if a.text() == words]
     (action,) = found
     action.trigger()

@@ -1,5 +1,6 @@
 """Scenes short enough to be run whole, on the simulated bench, many times."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -8,8 +9,10 @@ import pytest
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Executed
+from tactile_lab.bench import Bench
 from tactile_lab.engine.execution import Execution
 from tactile_lab.scene.load import load
+from tactile_lab.scene.scene import Scene
 from tactile_lab.store.run import Run
 from tactile_lab.waveform import Waveform
 
@@ -43,14 +46,19 @@ class Ran:
 
 
 @pytest.fixture
-def run_scene(tmp_path):
+def run_scene(tmp_path: Path) -> Callable[..., Ran]:
     """Run a scene by name with overrides, SI overrides as text, to the end."""
 
-    def run(*overrides, scene="demo", bench=None, watch=None):
+    def run(
+        *overrides: str,
+        scene: str = "demo",
+        bench: Callable[[Scene], Bench] | None = None,
+        watch: Callable[[Execution, events.Event], None] | None = None,
+    ) -> Ran:
         loaded = load(scene, overrides)
-        told = []
+        told: list[events.Event] = []
 
-        def emit(event):
+        def emit(event: events.Event) -> None:
             told.append(event)
             if watch is not None:
                 watch(execution, event)
@@ -71,5 +79,5 @@ SHORT = (
 
 
 @pytest.fixture
-def short():
+def short() -> tuple[str, ...]:
     return SHORT

@@ -1,6 +1,7 @@
 """Studies short enough to be carried out whole, many times."""
 
 from pathlib import Path
+from typing import Any
 
 from tactile_lab.studies.carry_out import StudyProgress, carry_out
 from tactile_lab.studies.dataset import Gathered
@@ -27,7 +28,7 @@ LEVELS = {
 }
 
 
-def done(asked: Study, out: Path, **how) -> tuple[Gathered, list[StudyProgress]]:
+def done(asked: Study, out: Path, **how: Any) -> tuple[Gathered, list[StudyProgress]]:
     told: list[StudyProgress] = []
     return carry_out(asked, out, tell=told.append, **{"count": 1, **how}), told
 

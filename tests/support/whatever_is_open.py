@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
@@ -28,7 +29,7 @@ force = "1 N"
 Open = Callable[[], object]
 
 
-def openers(lab, tmp_path: Path) -> dict[str, tuple[Open, ...]]:
+def openers(lab: Any, tmp_path: Path) -> dict[str, tuple[Open, ...]]:
     """How each file of the window that opens something is made to."""
     window = lab.window
     acts, stack = window.actions_, window.centre.stack
