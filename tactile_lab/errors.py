@@ -12,7 +12,8 @@ TactileLabError
 │   ├── NoReplyError      (TimeoutError)
 │   ├── BadReplyError     (ValueError)
 │   ├── RefusedError      (RuntimeError)
-│   └── SamplesLostError  (RuntimeError)
+│   ├── SamplesLostError  (RuntimeError)
+│   └── SurplusError      (RuntimeError)
 ├── InterlockError        (RuntimeError)
 ├── UnsafeError           (RuntimeError)
 ├── RecordingError        (OSError)
@@ -112,6 +113,10 @@ class RefusedError(InstrumentError, RuntimeError):
 
 class SamplesLostError(InstrumentError, RuntimeError):
     """Samples are missing from a stream that must be gapless."""
+
+
+class SurplusError(InstrumentError, RuntimeError):
+    """More samples came than time went by: when they were taken is not known."""
 
 
 class InterlockError(TactileLabError, RuntimeError):

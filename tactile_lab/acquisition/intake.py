@@ -14,7 +14,8 @@ from tactile_lab.acquisition.journal import Journal
 from tactile_lab.acquisition.live import LiveBins
 from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Reading
-from tactile_lab.errors import SamplesLostError
+from tactile_lab.errors import SamplesLostError, SurplusError
+from tactile_lab.quantity import show
 from tactile_lab.scope import CLOCK_ERROR, Block, Stream
 from tactile_lab.signals import AVERAGED
 
@@ -24,6 +25,9 @@ if TYPE_CHECKING:  # compiled code, which a run without spikes does not load
 LAG_WINDOW = 1.0
 """Time over which the least lag of the samples behind this computer's clock is taken:
 how long transfer takes differs from block to block, s."""
+
+AHEAD = 3
+"""Samples by which a stream may seem ahead of this computer's clock."""
 
 
 class FoundSpikes(NamedTuple):
@@ -68,6 +72,7 @@ class Intake:
         self.produced = 0
         self.late = 0.0
         self._least_lag = math.inf
+        self._surplus = False
         self._lag_at_begin: float | None = None
         self._lags_since = 0.0
         self.overrange: dict[str, float] = {}
@@ -116,7 +121,7 @@ class Intake:
         self._detector, self._journal = detector, journal
         self.searched = detector is not None
         self.late, self._least_lag, self._lag_at_begin = 0.0, math.inf, None
-        self._lags_since = start
+        self._lags_since, self._surplus = start, False
         self._means = {
             channel.signal: ChannelMean(stream, start, channel.signal)
             for channel in stream.channels
@@ -131,6 +136,8 @@ class Intake:
         Raises:
             SamplesLostError: samples between this block and the last are missing,
                 though the scope streams without gaps.
+            SurplusError: there are more than time went by for, by then all stored and
+                searched; told once a stream.
         """
         if self._stream is None or self._journal is None:
             raise SamplesLostError("A block arrived although no stream runs.")
@@ -151,9 +158,12 @@ class Intake:
         self._live.add(block)
         for signal, mean in self._means.items():
             self._readings += [(signal, reading) for reading in mean.feed(block)]
-        if self._detector is None:
-            return NONE_FOUND
-        return self._keep(self._detector.feed(block.first, block.codes[self._row]))
+        found = NONE_FOUND
+        if self._detector is not None:
+            codes = block.codes[self._row]
+            found = self._keep(self._detector.feed(block.first, codes))
+        self._refuse_surplus(self._stream, block.received)
+        return found
 
     def take_readings(self) -> list[tuple[str, Reading]]:
         """Readings of slow channels since last asked; times on the run's axis."""
@@ -184,6 +194,23 @@ class Intake:
             found = self._keep(self._detector.flush())
         self._stream, self._detector = None, None
         return found
+
+    def _refuse_surplus(self, stream: Stream, received: float) -> None:
+        """Transfer only makes samples late: none comes before it was taken."""
+        elapsed = received - stream.started
+        ahead = self._expected * stream.interval - elapsed
+        allowed = stream.uncertainty + AHEAD * stream.interval + CLOCK_ERROR * elapsed
+        if not stream.gapless or self._surplus or ahead <= allowed:
+            return
+        self._surplus = True
+        raise SurplusError(
+            f"Too many samples: the scope delivered {self._expected} a channel within "
+            f"{elapsed:.3f} s, {round(ahead / stream.interval)} more than it takes in "
+            f"that time at {show(1 / stream.interval, 'S/s')}. Its clock is fast by "
+            f"more than {CLOCK_ERROR * 1e6:.0f} ppm, or it or its driver repeats "
+            "samples, so when they were taken is not known. Measure a known frequency "
+            "with it; use another scope or driver if that is wrong."
+        )
 
     def _note_lag(self, elapsed: float, interval: float) -> None:
         """Follow the scope's clock: the newest samples came `elapsed` s after it began.

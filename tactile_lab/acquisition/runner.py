@@ -36,6 +36,7 @@ from tactile_lab.errors import (
     RecordingError,
     RefusedError,
     SamplesLostError,
+    SurplusError,
     TactileLabError,
 )
 from tactile_lab.scope import Stream
@@ -62,6 +63,7 @@ class Runner:
     Attributes:
         missing: what found that samples are missing from a stream without gaps; None
             where nothing did.
+        surplus: what found that there are more samples than time went by for.
     """
 
     def __init__(
@@ -98,6 +100,7 @@ class Runner:
             emit,
         )
         self.missing: str | None = None
+        self.surplus: str | None = None
         self._place_probes = bench.place_probes
         self._probes = "circuit"
 
@@ -129,7 +132,8 @@ class Runner:
             ending = Ending(state, off, reason, failure, self._stop.signal)
             try:
                 last = self._pump.last_words(failure)
-                self.missing = _missing(failure, *last)
+                self.missing = _told(SamplesLostError, failure, *last)
+                self.surplus = _told(SurplusError, failure, *last)
                 self._account.state(state, reason or off.text)
             except Exception as error:  # whatever it is, the coil's state is told
                 ending = ending.faulted_by(error)
@@ -416,7 +420,6 @@ class Runner:
             self._account.note_list(coil.list, shunt, self._program.coil_lag, code)
 
 
-def _missing(*failures: BaseException | None) -> str | None:
-    """What the first of `failures` says that tells of missing samples."""
-    lost = (str(one) for one in failures if isinstance(one, SamplesLostError))
-    return next(lost, None)
+def _told(kind: type[InstrumentError], *failures: BaseException | None) -> str | None:
+    """What the first of `failures` of this kind says."""
+    return next((str(one) for one in failures if isinstance(one, kind)), None)

@@ -62,6 +62,9 @@ def _result(verdict: Verification) -> str:
     """The last line: what it comes to."""
     if not verdict.sound:
         return f"{len(verdict.findings)} findings"
-    if verdict.certificate is not None and verdict.certificate.missing:
+    proof = verdict.certificate
+    if proof is not None and proof.missing:
         return "as it was written, but samples are missing"
+    if proof is not None and proof.surplus:
+        return "as it was written, but samples are too many"
     return "sound"

@@ -247,6 +247,7 @@ class Execution(Task[Executed]):
             },
             "overrange": sorted(runner.intake.overrange),
             "samples_missing": runner.missing,
+            "samples_surplus": runner.surplus,
         }
         if ending.failure and not isinstance(ending.failure, TactileLabError):
             told = "".join(traceback.format_exception(ending.failure))
@@ -255,8 +256,9 @@ class Execution(Task[Executed]):
             self.folder.finish(status, **entries)
             return None
         try:
-            # where samples are missing, how many the scope took is not known
-            produced = None if runner.missing else runner.intake.produced
+            # else how many the scope took is not known
+            accounted = runner.missing is None and runner.surplus is None
+            produced = runner.intake.produced if accounted else None
             self._recorder.close(status, produced, **entries)
         finally:
             proof = write_certificate(self.folder.path)

@@ -30,7 +30,8 @@ class Certificate:
     Attributes:
         produced: samples the scope delivered, all channels, and where it streams
             without gaps those known to be missing; None where the run was cut short
-            before it could say, or samples are missing and nobody knows how many.
+            before it could say, or samples are missing or too many and nobody knows
+            how many.
         written: samples stored, all channels.
         gaps: samples per channel known to be missing.
         covered: time that has samples, s; None for a scope that streams without gaps.
@@ -43,6 +44,7 @@ class Certificate:
         seen_from: shortest stretch of missing samples that the scope's driver would
             have noticed by its clock, s; None where it said nothing of that.
         missing: samples are missing, as the run found out, and how many is not known.
+        surplus: there are more than time went by for, as the run found out.
         searched: whether spikes were looked for while the run went on.
         asked: whether samples were to be stored.
     """
@@ -57,6 +59,7 @@ class Certificate:
     streamed: float | None = None
     seen_from: float | None = None
     missing: bool = False
+    surplus: bool = False
     searched: bool = True
     asked: bool = True
 
@@ -69,12 +72,18 @@ class Certificate:
     def clean(self) -> bool:
         """Nothing is known to be lost."""
         lost = self.gaps if self.covered is None else 0
-        return not (self.missing or self.samples or lost or self.spikes)
+        wrong = self.missing or self.surplus
+        return not (wrong or self.samples or lost or self.spikes)
 
     def __str__(self) -> str:
         if self.missing:
             samples = (
                 f"samples are missing, not known how many ({self.written:,} stored)"
+            )
+        elif self.surplus:
+            samples = (
+                f"more samples than time went by for ({self.written:,} stored), their "
+                "times are not known"
             )
         elif self.produced is None:
             samples = f"not known of {self.written:,} samples (the run was cut short)"
@@ -147,6 +156,7 @@ def certify(run: Run) -> Certificate:
         offline=None if offline is None else offline.size,
         spikes=None if offline is None else unmatched(online, offline).size,
         missing=bool(run.info.get("samples_missing")),
+        surplus=bool(run.info.get("samples_surplus")),
         searched=run.detection is not None,
         asked=bool(run.signals),
     )

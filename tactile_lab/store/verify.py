@@ -92,6 +92,8 @@ def verify(path: Path, progress: Progress = nothing) -> Verification:
             )
     if lost := info.get("samples_missing"):
         notes.append(f"samples were lost while the run was recorded: {lost}")
+    if extra := info.get("samples_surplus"):
+        notes.append(f"samples were too many while the run was recorded: {extra}")
     findings += _files(path, info)
     if not (path / DATA).exists():
         if has_lost_data(path, info):

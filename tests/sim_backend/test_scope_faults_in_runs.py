@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from drivers.picoscope.scope import PicoScope
@@ -108,6 +110,40 @@ def test_a_loss_that_only_the_last_poll_finds_is_told(tmp_path: Path) -> None:
     verdict = verify(done.folder)
     assert "Samples are missing" in verdict.notes[0]
     assert "not known how many" in str(verdict.certificate)
+
+
+@pytest.mark.parametrize("invents", [False, True], ids=["fast", "invents"])
+def test_more_samples_than_time_went_by_for_are_not_called_sound(
+    tmp_path: Path, invents: bool
+) -> None:
+    """The run was complete and sound, with times that were wrong by half a percent."""
+    scene = load("demo", OVERRIDES)
+    make = UnitModel(clock_error=0.0 if invents else -5e-3)
+    bench = open_bench(scene, needs(scene), make=make)
+    assert bench.scope is not None
+    poll, added = bench.scope.poll, 0
+
+    def poll_twice() -> Block | None:
+        nonlocal added
+        block = poll()
+        if block is None:
+            return None
+        # a driver that hands a tenth of each block over once more
+        more = block.codes[:, : block.samples // 10]
+        codes = np.concatenate([block.codes, more], axis=1)
+        first, added = block.first + added, added + more.shape[1]
+        return replace(block, first=first, codes=codes)
+
+    if invents:
+        bench.scope.poll = poll_twice  # type: ignore[method-assign]
+    done = Execution(scene, tmp_path, bench=bench).run()
+    assert done.state is RunState.FAULTED and done.off.verified
+    assert "Too many samples: the scope delivered" in (done.reason or "")
+    assert done.loss["samples"] is None
+    verdict = verify(done.folder)
+    assert verdict.sound and verdict.certificate is not None
+    assert "too many" in verdict.notes[0] and not verdict.certificate.clean
+    assert "their times are not known" in str(verdict.certificate)
 
 
 def test_samples_that_come_late_as_the_run_is_stopped_are_kept(tmp_path: Path) -> None:
