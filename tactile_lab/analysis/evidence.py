@@ -14,27 +14,28 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.estimate import Z95, correlated
+from tactile_lab.analysis.firing import Firing, charging, steps_between
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.equations import I_C
-from tactile_lab.model.simulate import Result, simulate
+from tactile_lab.model.slices import Samples, slices
 from tactile_lab.waveform import Waveform
+
+if TYPE_CHECKING:
+    from tactile_lab.model.solution import Solution
 
 VOLTAGES = frozenset({"V_GS", "V_S", "V_th", "V_fire", "V_reset"})
 SCALES = {**dict.fromkeys(VOLTAGES, 0.01), "I_bias": 1e-10, "g31": 0.004}
 """Steps of parameters fitted as they are; all others are fitted by their logarithm."""
-STEP = 1e-3
-"""I_C is integrated between spikes in steps no longer than this, s."""
 COMPUTED = 3e-7
 """What computing V_C1 to 1e-7 V leaves open of V_C2 when it fires, V."""
 ROUNDS = 5
@@ -71,7 +72,7 @@ class Residuals:
         short = np.diff(times) <= LONGEST
         self._earlier, self._later = times[:-1][short], times[1:][short]
         pairs = zip(self._earlier, self._later, strict=True)
-        self._straight = [_grid(a, b) for a, b in pairs]
+        self._straight = [steps_between(a, b) for a, b in pairs]
         self.bins = 0 if V_C1 is None else int(V_C1.time.size)
         self.offset = 0.0 if V_C1 is None else math.hypot(V_C1.resolution, V_C1.offset)
         self.size = self.bins + self._earlier.size
@@ -103,24 +104,18 @@ class Residuals:
 
     def under(self, driven: DrivenCircuit) -> FloatArray:
         """All residuals of a circuit and its force, V: of V_C1, then at firing."""
-        (circuit, force), found = driven, self._solved(driven)
-        parts = []
-        if self._trace is not None:
-            parts.append(self._trace.value - self._trace.modelled(found))
-        if self._later.size:
-            grids = self._between(force.time)
-            current = _charging(circuit, found, np.concatenate(grids))
-            parts.append(_at_firing(circuit, grids, current))
-        return np.concatenate(parts) if parts else np.empty(0)
-
-    def _between(self, bends: FloatArray) -> list[FloatArray]:
-        """Ends and middles of steps from spike to spike that none of `bends` parts."""
-        first = np.searchsorted(bends, self._earlier, side="right")
-        last = np.searchsorted(bends, self._later)
-        return [
-            grid if i >= j else _grid(grid[0], grid[-1], bends[i:j])
-            for grid, i, j in zip(self._straight, first, last, strict=True)
-        ]
+        trace, until = self._trace, self._duration
+        firing = Firing(driven, self._earlier, self._straight, until)
+        seen = None if trace is None else trace.samples(until)
+        if seen is None and not firing.misses.size:
+            return np.empty(0)
+        for part in self._solved(driven):
+            if seen is not None:
+                seen.take(part)
+            firing.take(part)
+        if trace is None or seen is None:
+            return firing.misses
+        return np.concatenate([trace.value - seen.value.mean(axis=1), firing.misses])
 
     def late(self, driven: DrivenCircuit) -> FloatArray:
         """What of V_C2 at firing a late spike changes, V/s, shape (pairs, 2).
@@ -128,15 +123,17 @@ class Residuals:
         Of the earlier spike, and of the later one.
         """
         circuit, ends = driven.circuit, np.column_stack([self._earlier, self._later])
-        current = _charging(circuit, self._solved(driven), ends.ravel())
+        there = Samples("V_C1", ends, self._duration)
+        for part in self._solved(driven):
+            there.take(part)
         at = np.array([circuit.reset_voltage, circuit.fire_voltage])
-        slope = current.reshape(ends.shape) / circuit.C2 - at / circuit.tau_L
+        slope = charging(circuit, there.value) / circuit.C2 - at / circuit.tau_L
         left = np.exp((self._earlier - self._later) / circuit.tau_L)
         return np.column_stack([-slope[:, 0] * left, slope[:, 1]])
 
-    def _solved(self, driven: DrivenCircuit) -> Result:
+    def _solved(self, driven: DrivenCircuit) -> Iterator[Solution]:
         circuit, force = driven
-        return simulate(
+        return slices(
             circuit, force, keep=("V_C1",), until=self._duration, tolerance=1e-7
         )
 
@@ -323,39 +320,3 @@ class Scatter:
 def scatter(residual: FloatArray) -> float:
     """Root mean square, V."""
     return float(np.sqrt(np.mean(residual**2)))
-
-
-def _charging(circuit: Circuit, found: Result, time: FloatArray) -> FloatArray:
-    """Current that charges C2 at times, s, in A."""
-    return np.asarray(I_C(circuit, found.sample("V_C1", time)) + circuit.I_bias)
-
-
-def _at_firing(
-    circuit: Circuit, grids: Sequence[FloatArray], current: FloatArray
-) -> FloatArray:
-    """V_C2 at each later spike, from V_reset at the earlier one, less V_fire."""
-    misses, at = np.empty(len(grids)), 0
-    for i, grid in enumerate(grids):
-        flowing = current[at : at + grid.size]
-        at += grid.size
-        left = np.exp((grid - grid[-1]) / circuit.tau_L)
-        charge = _simpson(flowing * left, grid) / circuit.C2
-        kept = circuit.reset_voltage * left[0]
-        misses[i] = charge + kept - circuit.fire_voltage
-    return misses
-
-
-def _grid(start: float, end: float, bends: FloatArray | None = None) -> FloatArray:
-    """Ends and middles of steps from `start` to `end` s; one ends at each of `bends`.
-
-    I_C bends where the force does, which a step across that would miss.
-    """
-    even = np.linspace(start, end, max(4, math.ceil((end - start) / (2 * STEP))) + 1)
-    ends = even if bends is None else np.union1d(even, bends)
-    return np.insert(ends, np.arange(1, ends.size), (ends[1:] + ends[:-1]) / 2)
-
-
-def _simpson(values: FloatArray, grid: FloatArray) -> float:
-    """Integral over steps whose ends and middles `grid` holds in turn."""
-    each = values[:-2:2] + 4 * values[1:-1:2] + values[2::2]
-    return float(np.diff(grid[::2]) @ each / 6)

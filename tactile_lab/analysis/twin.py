@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,8 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import ParameterError
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.simulate import ErrorEstimate, Result, simulate
+from tactile_lab.model.simulate import ErrorEstimate
+from tactile_lab.model.slices import Samples, slices
 from tactile_lab.model.state import Start
 from tactile_lab.waveform import Waveform
 
@@ -45,15 +46,13 @@ class Measured:
     steps: float = 0.0
     width: float = 0.0
 
-    def modelled(self, result: Result) -> FloatArray:
-        """The model's mean in each bin, V, shape (n,)."""
+    def samples(self, duration: float) -> Samples:
+        """Takes of the model, over `duration` s, what its mean in each bin is of."""
         if self.width < NARROW:
-            return result.sample(self.signal, self.time)
+            return Samples(self.signal, self.time[:, None], duration)
         within = ((np.arange(WITHIN) + 0.5) / WITHIN - 0.5) * self.width
-        at = np.clip(self.time[:, None] + within, 0.0, result.duration)
-        found = result.sample(self.signal, at.ravel()).reshape(at.shape)
-        mean: FloatArray = found.mean(axis=1)
-        return mean
+        at = np.clip(self.time[:, None] + within, 0.0, duration)
+        return Samples(self.signal, at, duration)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +137,7 @@ def twin(
     spike_times: ArrayLike | None = None,
     pauses: Sequence[tuple[float, float]] = (),
     start: Start | None = None,
-    displaced: Sequence[tuple[str, DrivenCircuit]] = (),
+    displaced: Iterable[tuple[str, DrivenCircuit]] = (),
 ) -> Twin:
     """Run the model beside measured data.
 
@@ -167,10 +166,18 @@ def twin(
     compared = [_within(trace, duration) for trace in voltages]
 
     def seen(driven: DrivenCircuit) -> _Seen:
-        # one at a time: the whole solution of ten minutes can take 200 MB
-        made = simulate(*driven, keep=tuple(keep), until=duration, start=start)
-        values = [trace.modelled(made) for trace in compared]
-        return _Seen(made.error, made.spike_times, values)
+        errors, spikes = [], []
+        samples = [trace.samples(duration) for trace in compared]
+        for part in slices(*driven, keep=tuple(keep), until=duration, start=start):
+            errors.append(ErrorEstimate.of(part))
+            spikes.append(part.spike_times)
+            for taken in samples:
+                taken.take(part)
+        return _Seen(
+            ErrorEstimate.largest(errors),
+            np.concatenate(spikes) if "spikes" in keep else None,
+            [taken.value.mean(axis=1) for taken in samples],
+        )
 
     found = seen(DrivenCircuit(circuit, force))
     causes = [(name, seen(moved)) for name, moved in displaced]

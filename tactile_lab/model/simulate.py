@@ -35,6 +35,22 @@ class ErrorEstimate(NamedTuple):
     spike_time: float | None
     V_C1: float | None
 
+    @classmethod
+    def of(cls, found: Solution) -> ErrorEstimate:
+        """What a solution estimates of itself."""
+        return cls(
+            found.error_spike_time if found.need.integrator else None,
+            found.error_V_C1 if found.need.node_a else None,
+        )
+
+    @classmethod
+    def largest(cls, found: Sequence[ErrorEstimate]) -> ErrorEstimate:
+        """That of several slices, at least one, of one solution."""
+        of_both = (
+            [e for e in each if e is not None] for each in zip(*found, strict=True)
+        )
+        return cls(*(max(each, default=None) for each in of_both))
+
 
 @dataclass(eq=False)
 class Result:
@@ -60,11 +76,7 @@ class Result:
     @property
     def error(self) -> ErrorEstimate:
         """How far from the exact solution at most, by estimate."""
-        found = self.solution
-        return ErrorEstimate(
-            found.error_spike_time if found.need.integrator else None,
-            found.error_V_C1 if found.need.node_a else None,
-        )
+        return ErrorEstimate.of(self.solution)
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -118,6 +130,30 @@ def simulate(
         SolverError: the model cannot answer to that tolerance.
     """
     duration = force.end if until is None else until
+    need, tolerance = asked(circuit, force, keep, duration, tolerance)
+    began = wall.perf_counter()
+    if start is None:
+        begin = solver().start_at_rest(circuit, force.first)
+    else:
+        state = state_at_start(circuit, force.first, start)
+        begin = solver().start_from(circuit, state)
+    solution = solver().solve(begin, force, duration, need, tolerance)
+    spikes = solution.spike_times if "spikes" in need.signals else None
+    return Result(duration, spikes, wall.perf_counter() - began, solution)
+
+
+def asked(
+    circuit: Circuit,
+    force: Waveform,
+    keep: Sequence[str],
+    duration: float,
+    tolerance: float,
+) -> tuple[Need, float]:
+    """What a simulation from time 0 on is to find, and to which tolerance.
+
+    Raises:
+        ParameterError: a bad option or waveform.
+    """
     if not 0 < duration < math.inf:
         raise ParameterError(
             f"The duration is {duration} s; it must be finite and above 0 s. Give "
@@ -128,25 +164,15 @@ def simulate(
             f"The force starts at {force.start:g} s; a simulation starts at 0 s. "
             "Shift the waveform."
         )
-    need = Need.of(keep, circuit.saturation)
-    tolerance = checked_tolerance(tolerance)
-    began = wall.perf_counter()
-    solver = _solver()
-    if start is None:
-        begin = solver.start_at_rest(circuit, force.first)
-    else:
-        begin = solver.start_from(circuit, state_at_start(circuit, force.first, start))
-    solution = solver.solve(begin, force, duration, need, tolerance)
-    spikes = solution.spike_times if "spikes" in need.signals else None
-    return Result(duration, spikes, wall.perf_counter() - began, solution)
+    return Need.of(keep, circuit.saturation), checked_tolerance(tolerance)
 
 
 @cache
-def _solver() -> ModuleType:
+def solver() -> ModuleType:
     """Compiled code, loaded by those who simulate, and looked for once."""
-    from tactile_lab.model import solver
+    from tactile_lab.model import solver as compiled
 
-    return solver
+    return compiled
 
 
 def state_at_start(circuit: Circuit, force: float, start: Start | None) -> State:

@@ -19,11 +19,12 @@ from tactile_lab.plot import Guide, Panel, Plot, Series, spike_train
 from tactile_lab.quantity import show
 from tactile_lab.report.splice import ClosedTime
 from tactile_lab.spikes.rate import rates_between
+from tactile_lab.trace import Trace
 
 SHARP = {"V_C2", "V_K"}
 """Signals that jump within a bin: their extremes are the trace, not their mean."""
 DRAWN_BINS = 1600
-"""More bins than a printed column can show only swell the file."""
+"""More bins, or columns with corners, than can be printed only swell the file."""
 
 Told = tuple[Panel, str]
 """A panel, and what its caption says of it."""
@@ -91,6 +92,8 @@ def overranges(signals: list[RecordedSignal], axis: ClosedTime) -> list[Guide]:
 def _force(run: Measurement, axis: ClosedTime) -> Told:
     time = axis.closed(np.append(run.force.time, max(run.duration, run.force.end)))
     force = np.append(run.force.value, run.force.value[-1])
+    drawn = Trace.line(time, force).corners(DRAWN_BINS)
+    time, force = drawn.time, drawn.mean
     low = high = None
     if run.force_uncertainty is not None:
         # only where there is a force: at rest its zero is a definition

@@ -1,4 +1,7 @@
+import re
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -6,10 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactile_lab.analysis.belief import PART
+from tactile_lab.analysis.evidence import Residuals
 from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.analysis.twin import Measured, twin
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import ParameterError
+from tactile_lab.model import slices
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.waveform import Waveform
@@ -23,6 +28,49 @@ def measured(circuit, signal="V_C1", noise=0.0, bins=500):
     rng = np.random.default_rng(1)
     value = found.sample(signal, time) + rng.normal(0, noise, bins)
     return Measured(signal, time, value), found.spike_times
+
+
+def peak(doing):
+    """Memory that it takes at most beyond what there was, MB; and its answer."""
+
+    def told():
+        text = Path("/proc/self/status").read_text()
+        return int(re.search(r"VmHWM:\s+(\d+)", text)[1]) / 1024
+
+    Path("/proc/self/clear_refs").write_text("5")
+    before, found = told(), doing()
+    return told() - before, found
+
+
+LONG = np.linspace(0, 30, 150_000)
+SWINGING = Waveform(LONG, 0.1 + 0.05 * np.sin(2 * np.pi * LONG))
+BINS = (np.arange(4000) + 0.5) * SWINGING.end / 4000
+SEEN = Measured("V_C1", BINS, np.full(BINS.size, 3.0), width=SWINGING.end / 4000)
+SPIKES = np.arange(1.0, SWINGING.end, 0.05)
+
+
+def beside():
+    found = twin(Circuit(), SWINGING, 30.0, voltages=[SEEN], spike_times=SPIKES)
+    return np.concatenate([found.error, found.residuals[0].predicted])
+
+
+def residuals():
+    problem = Residuals(Circuit(), (), SWINGING, 30.0, SEEN, SPIKES)
+    driven = DrivenCircuit(Circuit(), SWINGING)
+    return np.append(problem.under(driven), problem.late(driven))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux tells a process its peak")
+@pytest.mark.parametrize("compared", [beside, residuals])
+def test_a_long_force_is_compared_in_the_memory_of_a_slice(compared, monkeypatch):
+    """Ten minutes of `repeat` are 380,000 points, of which all took 470 MB at once."""
+    _, warm = peak(compared)
+    sliced, found = peak(compared)
+    monkeypatch.setattr(slices, "POINTS", SWINGING.time.size)
+    whole, at_once = peak(compared)
+    assert np.array_equal(found, at_once)
+    assert np.array_equal(found, warm)
+    assert sliced < 0.4 * whole
 
 
 def test_the_mean_of_a_bin_is_compared_with_the_model_s_mean():

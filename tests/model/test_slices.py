@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactile_lab.errors import ParameterError
+from tactile_lab.model import slices
 from tactile_lab.model.advance import advance, rest
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.simulate import simulate
+from tactile_lab.model.simulate import ErrorEstimate, simulate
 from tactile_lab.waveform import Waveform
 
 FORCE = Waveform.through(
@@ -98,3 +99,31 @@ def test_a_state_without_v_c2_cannot_go_on_with_it():
 def test_time_does_not_run_backwards():
     with pytest.raises(ParameterError, match="until"):
         advance(Circuit(), rest(Circuit(), time=2.0), FORCE, 1.0)
+
+
+@pytest.mark.parametrize("circuit", [*CIRCUITS, Circuit(saturation=True)])
+def test_a_long_force_is_solved_in_slices_as_at_once(circuit, monkeypatch):
+    monkeypatch.setattr(slices, "POINTS", 100)
+    time = np.linspace(0, 1.2, 400)
+    force = Waveform.stairs(np.column_stack([time, FORCE.at(time)]), 1.3)
+    keep, at = ("spikes", "V_C1", "V_C2", "V_K"), np.linspace(0, 1.3, 700)[::-1]
+    whole = simulate(circuit, force, until=1.3, keep=keep)
+    spikes, errors = [], []
+    taken = {name: slices.Samples(name, at, 1.3) for name in ("V_C1", "V_C2", "V_K")}
+    for part in slices.slices(circuit, force, until=1.3, keep=keep):
+        spikes.extend(part.spike_times)
+        errors.append(ErrorEstimate.of(part))
+        for samples in taken.values():
+            samples.take(part)
+    assert len(errors) > 5
+    assert spikes == pytest.approx(whole.spike_times, abs=1e-14)
+    assert ErrorEstimate.largest(errors) == pytest.approx(whole.error, rel=1e-6)
+    for name, samples in taken.items():
+        assert samples.value == pytest.approx(whole.sample(name, at), abs=1e-12), name
+
+
+def test_slices_have_nothing_beyond_their_end():
+    samples = slices.Samples("V_C1", np.array([0.5, 1.3]), 1.2)
+    with pytest.raises(ParameterError, match="within"):
+        for part in slices.slices(Circuit(), FORCE, until=1.2, keep=("V_C1",)):
+            samples.take(part)

@@ -225,6 +225,19 @@ def test_the_caption_says_whether_the_current_was_played(demo):
     assert "its steps are the points of the waveform played" in played
 
 
+def test_a_long_force_is_drawn_by_as_many_corners_as_can_be_seen(demo):
+    """The page of an hour of `repeat` had 115 MB, nearly all of it this line."""
+    time = np.linspace(0, demo.duration, 60_000)
+    swing = Waveform(time, 0.1 + 0.05 * np.sin(2 * np.pi * 50 * time))
+    drawn = overview(replace(demo, force=swing)).panels[0].series[0]
+    assert np.size(drawn.x) == np.size(drawn.y) <= 4 * 1601
+    assert np.all(np.diff(drawn.x) >= 0)
+    assert (np.min(drawn.y), np.max(drawn.y)) == (swing.value.min(), swing.value.max())
+    assert (drawn.x[0], drawn.x[-1]) == (0.0, demo.duration)
+    whole = overview(demo).panels[0].series[0]
+    assert np.array_equal(whole.x[:-1], demo.force.time), "a short one is drawn whole"
+
+
 def test_i_ds_is_derived_where_v_c1_is_known(demo):
     findings = find(demo)
     derived = findings.run.trace("I_DS")
