@@ -179,6 +179,14 @@ class Coil(Protocol):
         """Connect, identify, make safe, measure the update interval."""
         ...
 
+    def heed(self, halted: Callable[[], bool]) -> None:
+        """From `energise` on look at `halted` last thing before whatever is sent.
+
+        Once it is true only `safe_off` and `close` still send; all else, a list half
+        loaded too, ends with a `HaltedError`.
+        """
+        ...
+
     def energise(self) -> None:
         """Set compliance and 0 A, verify both, then switch the output on."""
         ...

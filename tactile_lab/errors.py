@@ -15,6 +15,7 @@ TactileLabError
 │   ├── SamplesLostError  (RuntimeError)
 │   └── SurplusError      (RuntimeError)
 ├── InterlockError        (RuntimeError)
+├── HaltedError           (RuntimeError)
 ├── UnsafeError           (RuntimeError)
 ├── RecordingError        (OSError)
 ├── RunFolderError        (ValueError)
@@ -121,6 +122,10 @@ class SurplusError(InstrumentError, RuntimeError):
 
 class InterlockError(TactileLabError, RuntimeError):
     """A safety limit tripped; it stays latched until acknowledged."""
+
+
+class HaltedError(TactileLabError, RuntimeError):
+    """A stop came first: a line that does not lead to output off was not sent."""
 
 
 class UnsafeError(TactileLabError, RuntimeError):

@@ -6,6 +6,8 @@ heat budget, read-back, resistance. Every way out leads through `safe_off`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from drivers.coil.guard import Guard, in_process
 from drivers.coil.interlock import GENERATOR, Interlock, check_current, narrowed
 from drivers.coil.list_mode import check_list, check_points, load
@@ -75,6 +77,10 @@ class CoilSource(SerialInstrument[CoilWire]):
         self._commanded = clock.now()
         self._energised = False
         self._reached = False
+        self._halted: Callable[[], bool] = lambda: False
+        self._on_way_out = True
+        """Nothing is kept back: nothing is switched on, or it is being switched off."""
+        self._wire.halted = lambda: not self._on_way_out and self._halted()
         self._given_up: OffReport | None = None
         """What could not be verified off and is the guard's from `close` on."""
         self._interlock = Interlock(self._limits, clock.now(), guard, self._warn)
@@ -154,16 +160,22 @@ class CoilSource(SerialInstrument[CoilWire]):
                 self.identity, on, wire.current() if on else wire.current_when_off()
             )
 
+    def heed(self, halted: Callable[[], bool]) -> None:
+        """From `energise` to `safe_off` send nothing once `halted()` is true."""
+        self._halted = halted
+
     def energise(self) -> None:
         """Set compliance and 0 A, verify both, then switch the output on.
 
         Raises:
+            HaltedError: a stop came first; the output is off.
             InterlockError: tripped and not acknowledged.
             RefusedError: the source does not take a setting.
         """
         self._interlock.refuse_when_tripped()
         if self._energised:
             return
+        self._on_way_out = False
         self._prepare()
         if self._guard is not None:
             self._guard.arm()
@@ -204,6 +216,7 @@ class CoilSource(SerialInstrument[CoilWire]):
                 give, or the output is off.
             InterlockError: the heat budget is spent or the guard is gone; the output
                 is off by then.
+            HaltedError: a stop came first.
         """
         check_current(current, self._limits, self.dialect)
         self._interlock.refuse_when_tripped()
@@ -217,14 +230,14 @@ class CoilSource(SerialInstrument[CoilWire]):
         step = self._limits.slew * passed + 0.5 * self.dialect.grain
         within = min(max(current, self._setpoint - step), self._setpoint + step)
         wanted = self.dialect.fixed(within)
-        self._commanded = now
         try:
             self._wire.set_current(wanted)
-            # a late answer may mean that the step was taken late
-            self._commanded = max(now, self._clock.now() - self._interval)
         except InstrumentError:
+            self._commanded = now
             self._setpoint = None  # it may or may not have been taken
             raise
+        # a late answer may mean that the step was taken late
+        self._commanded = max(now, self._clock.now() - self._interval)
         self._took(wanted)
         return wanted
 
@@ -234,6 +247,7 @@ class CoilSource(SerialInstrument[CoilWire]):
         Raises:
             LimitError: a list the source, coil or heat budget does not allow.
             RefusedError: the source does not hold all of it.
+            HaltedError: a stop came before its last line.
         """
         mode = check_list(points, self._limits, self.dialect)
         self._interlock.heat.refuse_list(points, self._clock.now())
@@ -362,6 +376,7 @@ class CoilSource(SerialInstrument[CoilWire]):
                 "The source was never reached: this program switched nothing on, and "
                 "what its output does is unknown.",
             )
+        self._on_way_out = True
         self._given_up = self._follows = None
         # with a voltage at the analogue input the set-point is not all that flows, and
         # a set-point of what flows would double it

@@ -12,6 +12,7 @@ from drivers.serial_line import failures
 from drivers.serial_line.link import SerialLink
 from tactile_lab.errors import (
     BadReplyError,
+    HaltedError,
     InstrumentError,
     LinkLostError,
     NoReplyError,
@@ -41,6 +42,8 @@ class Conversation(Generic[D]):
     (questions and set-points may be repeated without harm).
 
     Attributes:
+        halted: asked last thing before a line that changes state, and before a question
+            is asked again; once it is true there is neither.
         acted: when the last command is taken to have been acted on, clock time, s: as
             what came after it on the wire, its answer, set out.
     """
@@ -48,6 +51,7 @@ class Conversation(Generic[D]):
     def __init__(self, link: SerialLink, dialect: D) -> None:
         self.link = link
         self.dialect = dialect
+        self.halted: Callable[[], bool] = lambda: False
         self.acted = -math.inf
 
     def connect(self) -> None:
@@ -157,8 +161,12 @@ class Conversation(Generic[D]):
         try:
             return self.link.query(line, blank=blank)
         except (NoReplyError, BadReplyError):
+            if self.halted():
+                raise
             self.link.resynchronise()
             reported = self._empty_errors(self.link.query)
+            if self.halted():
+                raise
         try:
             return self.link.query(line, blank=blank)
         except NoReplyError as reason:
@@ -192,6 +200,7 @@ class Conversation(Generic[D]):
 
         Raises:
             RefusedError: the instrument reports an error.
+            HaltedError: it was not sent.
         """
         self._command(line, self.query)
 
@@ -200,6 +209,7 @@ class Conversation(Generic[D]):
 
         Raises:
             RefusedError: the instrument reports an error.
+            HaltedError: it was not sent.
             NoReplyError, BadReplyError: the answer is lost; the line may have come.
                 The link is in step again if it can be.
         """
@@ -212,6 +222,9 @@ class Conversation(Generic[D]):
             raise
 
     def _command(self, line: str, query: Callable[[str], str]) -> None:
+        self.link.settle()
+        if self.halted():
+            raise HaltedError(f"A stop came before {line!r}, which was not sent.")
         asked = self.link.now
         if self.dialect.error is None:
             self.link.write(line)

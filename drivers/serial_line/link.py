@@ -172,7 +172,7 @@ class SerialLink:
             LinkLostError: unplugged.
             NoReplyError: the far end takes nothing.
         """
-        self._settle()
+        self.settle()
         self._send(line)
         if self.wire.echo:
             self._echoes.append(line)
@@ -189,7 +189,7 @@ class SerialLink:
             NoReplyError: no complete answer in time.
             BadReplyError: bytes that are no text.
         """
-        self._settle()
+        self.settle()
         self._asked = line
         answer = self._exchange(line, blank)
         self._patient = True
@@ -322,9 +322,15 @@ class SerialLink:
             with self._mapped() as port:
                 send_on(port)
 
-    def _settle(self) -> None:
+    def settle(self) -> None:
+        """Do all that the next line has to wait for.
+
+        Raises:
+            LinkLostError, NoReplyError, BadReplyError: as `resynchronise`.
+        """
         if self._doubtful:
             self.resynchronise()
+        self._clock.sleep_until(self._free_at)
 
     def _exchange(self, line: str, blank: bool = False) -> str:
         self._doubtful = True

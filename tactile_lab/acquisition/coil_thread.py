@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import cast
 
@@ -16,7 +17,7 @@ from tactile_lab.bench import AnalogueCoil, Coil, ListCoil, OffReport
 from tactile_lab.clock import Clock
 from tactile_lab.current_list import CurrentList
 from tactile_lab.drive import Drive
-from tactile_lab.errors import InstrumentError
+from tactile_lab.errors import HaltedError, InstrumentError
 from tactile_lab.waveform import Waveform
 
 READ_BACK_EVERY = 0.25
@@ -217,36 +218,15 @@ class CoilThread(InstrumentThread):
 
     def open(self) -> None:
         """Open the source; it makes itself safe on the way."""
+        self.coil.heed(self._is_halted)
         self.coil.open()
         self.settings = {"identity": self.coil.identity, **self.coil.settings()}
 
     def work(self) -> None:
         """Play what is asked for until told to leave, to stop, or left alone."""
-        while not self._leaving:
-            self.coil.beat()
-            if self._stop.requested:
-                return
-            self._lease.check()
-            if self._energise:
-                self.switched_on = True  # before it is: its answers may come late
-                self.coil.energise()
-                self.settings.update(self.coil.settings())
-                # before the first trial: its ramp would lose set-points to this
-                self._note(self._read_back(self.clock.now(), 0.0))
-                self._energise, self.live = False, True
-                self.clock.notify()
-            if self._load is not None or self._start_list:
-                self._begin_list(cast("ListCoil", self.coil))
-            if self._generated is not None and self.generator is not None:
-                self._begin_generated(self._generated, self.generator)
-            if self.list is not None and self.plays_list:
-                self._watch(self.list, self.clock.now())
-            now = self.clock.now()
-            if self._waveform is not None and now >= self._next:
-                self._asked = now
-                self._update(self._waveform, now)
-                self._asked = None
-            self.clock.wait_for(self._called, self._wake())
+        with suppress(HaltedError):
+            while not self._is_halted():
+                self._turn()
 
     def make_safe_and_close(self) -> None:
         """Switch off, verify by read-back, close."""
@@ -270,11 +250,39 @@ class CoilThread(InstrumentThread):
         except InstrumentError as failure:
             self.failure = self.failure or failure
 
+    def _is_halted(self) -> bool:
+        return self._leaving or self._stop.requested
+
+    def _turn(self) -> None:
+        """Do what is due, and wait until something is."""
+        self.coil.beat()
+        self._lease.check()
+        if self._energise:
+            self.switched_on = True  # before it is: its answers may come late
+            self.coil.energise()
+            self.settings.update(self.coil.settings())
+            # before the first trial: its ramp would lose set-points to this
+            self._note(self._read_back(self.clock.now(), 0.0))
+            self._energise, self.live = False, True
+            self.clock.notify()
+        if self._load is not None or self._start_list:
+            self._begin_list(cast("ListCoil", self.coil))
+        if self._generated is not None and self.generator is not None:
+            self._begin_generated(self._generated, self.generator)
+        if self.list is not None and self.plays_list:
+            self._watch(self.list, self.clock.now())
+        now = self.clock.now()
+        if self._waveform is not None and now >= self._next:
+            self._asked = now
+            self._update(self._waveform, now)
+            self._asked = None
+        self.clock.wait_for(self._called, self._wake())
+
     def _called(self) -> bool:
         due = self._waveform is not None and self.clock.now() >= self._next
         asked = self._energise or self._load is not None or self._start_list
         asked = asked or self._generated is not None
-        return due or asked or self._leaving or self._stop.requested
+        return due or asked or self._is_halted()
 
     def _wake(self) -> float:
         pulse = self.clock.now() + 0.1
@@ -324,7 +332,7 @@ class CoilThread(InstrumentThread):
         self._generated = None
         coil.follow(points, player.grain)
         self.plays_list = True
-        began = player.start(coil.beat)
+        began = player.start(coil.beat, self._is_halted)
         coil.followed_from(*began)
         self.list = PlayedList(points, *began, generated=True)
         self._passed, self._read = 0, began[0]

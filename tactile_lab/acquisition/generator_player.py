@@ -10,7 +10,7 @@ from tactile_lab.acquisition.scope_thread import ScopeThread
 from tactile_lab.clock import Clock
 from tactile_lab.current_list import CurrentList
 from tactile_lab.drive import Drive
-from tactile_lab.errors import NoReplyError
+from tactile_lab.errors import HaltedError, NoReplyError
 from tactile_lab.generator import Generator
 
 ANSWERS = 1.0
@@ -77,15 +77,31 @@ class GeneratorPlayer:
         self.loaded = None
         self._scope.do(load)
 
-    def start(self, beat: Callable[[], None]) -> tuple[float, float]:
+    def start(
+        self, beat: Callable[[], None], halted: Callable[[], bool]
+    ) -> tuple[float, float]:
         """Have the points played; between which clock times they began, s.
+
+        Args:
+            beat: a sign of life, given while the scope's thread is waited for.
+            halted: asked last thing before; once it is true they are not played.
 
         Raises:
             NoReplyError: the scope's thread does not start them.
+            HaltedError: a stop came first.
         """
         self._began = None
-        self._scope.do(self._start)
-        self._wait(lambda: self._began is not None, ANSWERS, beat)
+
+        def begin() -> None:
+            if not halted():
+                self._start()
+
+        self._scope.do(begin)
+        self._wait(lambda: self._began is not None or halted(), ANSWERS, beat)
+        if self._began is None and halted():
+            raise HaltedError(
+                "A stop came before the generator, which was not started."
+            )
         if self._began is None:
             raise NoReplyError(
                 f"The scope's generator did not start within {ANSWERS:g} s."

@@ -1,5 +1,9 @@
 """The coil's thread beside the real driver on a simulated wire, on simulated time."""
 
+import re
+from collections.abc import Callable
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -7,6 +11,8 @@ from sim_backend.serial_line import wires
 from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.acquisition.coil_thread import CoilThread
 from tactile_lab.acquisition.stop import Lease, StopRequest
+from tactile_lab.current_list import CurrentList
+from tactile_lab.drive import Drive
 from tactile_lab.engine.bench import open_bench
 from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
@@ -173,3 +179,93 @@ def test_an_output_that_is_on_is_never_told_to_be_off(
     assert [told for on, *told in seen if on and told != [True, None]] == []
     assert sum(on for on, *_ in seen) >= 2, "it was on, and asked"
     assert thread.state.off is not None and not thread.state.live
+
+
+SHORT = Drive(
+    Waveform(np.array([0.0, 0.3]), np.zeros(2)),
+    CurrentList(np.r_[np.linspace(0.0, 0.2, 40), np.zeros(1)], np.full(41, 0.01)),
+)
+
+
+def drives(thread: CoilThread, way: str) -> None:
+    """Switch the coil on and have it move by set-points or a list, unless it ends."""
+    clock = thread.clock
+
+    def until(done: Callable[[], bool]) -> None:
+        clock.wait_for(lambda: thread.ended or done(), clock.now() + LONGEST)
+
+    thread.energise()
+    until(lambda: thread.live)
+    if way == "list":
+        thread.load_list(SHORT)
+        until(lambda: thread.loaded is SHORT.points)
+        thread.play_list()
+        until(lambda: thread.list is not None and not thread.plays_list)
+    else:
+        thread.play(RAMP.shifted(clock.now()), clock.now() + 0.25)
+        until(lambda: thread.last is not None and thread.last.setpoint == 0.4)
+
+
+def leads_off(line: str, flowing: float) -> bool:
+    """Whether a line only asks, goes towards 0 A from what flows, or switches off."""
+    said = line.removesuffix(";:SYST:ERR?")
+    if said.endswith("?") or said in ("OUTP 0", "CURR:MODE FIX", "SYST:REM 0"):
+        return True
+    number = re.fullmatch(r"CURR ([\d.]+)", said)
+    return number is not None and float(number[1]) <= flowing + 5e-3
+
+
+Line = tuple[str, float]
+"""What the source heard, and what flowed then, A."""
+
+
+def heard_with_stop_at(count: int, way: str, lost: int | None) -> list[Line] | None:
+    """Lines from the one on at which STOP came; None where there were not so many."""
+    thread = coil_thread()
+    clock = thread.clock
+    far = [far for name, far in wires._far_ends.items() if "coil" in name][-1]
+    act, lines = far.instrument.line, []
+
+    def acted(line: bytes) -> bytes | None:
+        if thread.opened:
+            lines.append((line.decode(), far.instrument.measured_current()))
+            if lost is not None and len(lines) == count - lost:
+                far.faults.add(SerialFault(kind="missing"))
+            if len(lines) == count:
+                thread._stop("STOP")
+        return act(line)
+
+    far.instrument.line = acted
+    with clock.taking_part("test"):
+        thread.start()
+        clock.wait_for(lambda: thread.opened, clock.now() + LONGEST)
+        drives(thread, way)
+        halted = thread._stop.requested
+        thread.leave()
+        clock.wait_for(lambda: thread.ended, clock.now() + 60.0)
+    assert thread.off is not None and thread.off.verified
+    assert not far.instrument.output_on
+    return lines[count - 1 :] if halted else None
+
+
+@pytest.mark.parametrize(
+    ("way", "lost"),
+    [("set-points", None), ("set-points", 0), ("set-points", 1), ("list", None)],
+)
+def test_once_a_stop_is_accepted_only_what_leads_to_off_is_sent(
+    way: str, lost: int | None
+) -> None:
+    """STOP comes as the source hears a line, be it any of them.
+
+    It is answered; or its answer is lost, or that of the line before, so that STOP
+    comes as the link gets into step again. The output was switched on, a list loaded
+    to its end, and a step sent that had waited for the lost answer.
+    """
+    at, wrong = [], []
+    while heard := heard_with_stop_at(len(at) + 1, way, lost):
+        at.append(heard[0][0])
+        for (_, before), (line, now) in pairwise(heard):
+            if not leads_off(line, max(before, now)):  # it says what it just measured
+                wrong.append((at[-1], line, now))
+    assert wrong == []
+    assert len(at) >= 16  # a ramp's set-points among them, or a list's lines
