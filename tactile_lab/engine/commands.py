@@ -1,4 +1,4 @@
-"""What a window, a script or a notebook asks of tasks; carried out in the engine.
+"""What a window, a script or a notebook asks of tasks, but STOP; done in the engine.
 
 `Link.begin` takes the functions that make a task, `RemoteTask.say` those that do
 something to one. A new one is a function here, or wherever it belongs: it need only be
@@ -88,11 +88,6 @@ def begin_manual(served: ServedTask, request: Request) -> ManualControl:
     from tactile_lab.engine.manual import ManualControl
 
     return ManualControl(request.load(), realtime=True, emit=served.emit)
-
-
-def stop(served: ServedTask, reason: str) -> None:
-    """Switch the coil off and end a task; goes straight to the coil's thread."""
-    served.stop(reason)
 
 
 def note(served: ServedTask, text: str, time: float | None) -> None:

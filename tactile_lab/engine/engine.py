@@ -7,7 +7,7 @@ verified off and its record completed, before the process ends.
 
 What is asked is a function with its arguments, carried out here: to begin a task, to
 say something to it, or to answer a question. Nothing asked is waited on: a STOP is read
-at once and goes straight to the coil.
+at once and goes straight to the coil, past whatever was said before it and is not done.
 """
 
 from __future__ import annotations
@@ -78,9 +78,9 @@ class Reply(Generic[T]):
 class Engine:
     """Serves one pipe.
 
-    What comes through it is (number, how, act, arguments, named ones): `act` is a
-    function, `how` is `begin`, `say` or `ask`, and all that is told of it carries its
-    number. None means that the other end goes.
+    What comes through it is (number, how, act, arguments, named ones): `how` is
+    `begin`, `say`, `stop` or `ask`, `act` a function, or why to stop, and all that is
+    told of it carries its number. None means that the other end goes.
 
     Args:
         pipe: to whoever looks.
@@ -100,10 +100,12 @@ class Engine:
         self._sending = threading.Lock()
         self.tasks: dict[int, ServedTask] = {}
         self.instruments = threading.Lock()
+        self._said: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._questions = threading.BoundedSemaphore(MOST_QUESTIONS)
 
     def serve(self) -> None:
         """Do what is asked until the other end has gone; then leave every coil off."""
+        said = start(self._do_said, "said")
         try:
             while (asked := self._next()) is not None:
                 number, how, act, arguments, named = asked
@@ -115,6 +117,8 @@ class Engine:
                 task.stop("The window has gone")
             for task in self.tasks.values():
                 task.thread.join(LEAVE)
+            self._said.put(None)
+            said.join(LEAVE)
             self._pipe.close()
 
     def _next(self) -> Any:
@@ -148,9 +152,22 @@ class Engine:
         )
 
     def say(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
-        """Do `act(served, ...)` to a task at once; one that has ended hears nothing."""
+        """Have `act(served, ...)` done to a task; one that has ended hears nothing."""
         if number in self.tasks:
-            act(self.tasks[number], *arguments, **named)
+            self._said.put(partial(act, self.tasks[number], *arguments, **named))
+
+    def stop(self, number: int, reason: str) -> None:
+        """Switch off and end a task, now."""
+        if number in self.tasks:
+            self.tasks[number].stop(reason)
+
+    def _do_said(self) -> None:
+        """Do what is said in its order, in a thread of its own: a note may take long.
+
+        Its disk may be slow, and a STOP behind it would wait as long.
+        """
+        while (act := self._said.get()) is not None:
+            act()
 
     def ask(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
         """Have `act(engine, ...)` worked out beside everything else, and reply."""
@@ -220,9 +237,10 @@ class ServedTask:
                 act(self.task)
 
     def stop(self, reason: str) -> None:
-        """Switch off and end it; returns at once."""
+        """Switch off and end it; returns at once, and waits for no lock."""
         self._stopped = reason
-        self.to_task(lambda task: task.stop(reason))
+        if self.task is not None:
+            self.task.stop(reason)
 
     def emit(self, event: Event) -> None:
         """The task tells something."""
@@ -284,6 +302,8 @@ class ServedTask:
             self.task = task
             for act in self._said:
                 act(task)
+        if self._stopped is not None:  # before there was a task that could hear it
+            task.stop(self._stopped)
         folder = getattr(task, "folder", None)
         magnet, coil = task.scene.bench.magnet, task.bench.coil
         self._tell(

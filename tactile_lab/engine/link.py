@@ -24,7 +24,6 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.bench import OffReport
-from tactile_lab.engine import commands
 from tactile_lab.engine.engine import Act, Engine, Reply, ServedTask, main
 from tactile_lab.engine.events import Ended, TaskEvent
 from tactile_lab.engine.process import EngineProcess
@@ -44,7 +43,7 @@ class RemoteTask:
 
     Args:
         number: names it in the engine.
-        send: sends an act with its arguments to it.
+        send: sends an act with its arguments to it, as `Engine` is to take it.
         hear: takes its events when the link is polled; None: they are iterated over.
     """
 
@@ -62,11 +61,11 @@ class RemoteTask:
         **named: P.kwargs,
     ) -> None:
         """Have one of `engine.commands` done to it; returns at once."""
-        self._send(act, *arguments, **named)
+        self._send(Engine.say, act, *arguments, **named)
 
     def stop(self, reason: str) -> None:
         """Switch the coil off and end; returns at once."""
-        self.say(commands.stop, reason)
+        self._send(Engine.stop, reason)
 
     @property
     def alive(self) -> bool:
@@ -143,7 +142,7 @@ class Link:
         """
         with self._lock:
             number = self._number()
-            task = RemoteTask(number, partial(self._say, number), hear)
+            task = RemoteTask(number, partial(self._send, number), hear)
             self._tasks[number] = task
             self._write((number, Engine.begin, act, arguments, named))
         return task
@@ -235,9 +234,11 @@ class Link:
         self._last += 1
         return self._last
 
-    def _say(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
+    def _send(
+        self, number: int, how: Act, act: Act | str, *arguments: Any, **named: Any
+    ) -> None:
         with self._lock:
-            self._write((number, Engine.say, act, arguments, named))
+            self._write((number, how, act, arguments, named))
 
     def _write(self, asked: object) -> None:
         """Have it sent; a pipe is full where an engine starts, and holds up nobody."""

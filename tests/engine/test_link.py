@@ -16,7 +16,7 @@ from engine_answers import answered, pid_of, size_of
 
 from tactile_lab.acquisition.events import RunState, SpikesSeen
 from tactile_lab.engine import engine as module
-from tactile_lab.engine.commands import begin_monitor, begin_run
+from tactile_lab.engine.commands import begin_monitor, begin_run, note
 from tactile_lab.engine.engine import MOST_QUESTIONS, MOST_TASKS, Engine, Reply
 from tactile_lab.engine.events import Begun, Ended, Samples
 from tactile_lab.engine.jobs import check_bench
@@ -71,6 +71,21 @@ def test_a_stop_said_before_anything_is_made_ends_the_run_with_the_coil_off(tmp_
     ending = told[-1].ending
     assert ending.state is RunState.ABORTED and ending.reason == "at once"
     assert ending.off.verified and not run.alive
+
+
+def test_a_stop_waits_for_no_note_that_the_disk_does_not_take(tmp_path):
+    """Its file is a pipe here: whoever looks into it waits until somebody writes."""
+    longer = ('protocol.levels=["80 mN"]', "protocol.hold=3 s")
+    with Link(separate=False) as link:
+        run = link.follow(begin_run, Request("demo", longer), tmp_path, {})
+        begun = next(iter(run))
+        remarks = begun.folder / "remarks.json"
+        os.mkfifo(remarks)
+        run.say(note, "the disk hangs", None)
+        run.stop("before the note is there")
+        *_, told = run
+        remarks.write_text("{}")
+    assert told.ending.state is RunState.ABORTED and told.ending.off.verified
 
 
 def test_a_refused_task_only_ends_and_says_why(tmp_path):

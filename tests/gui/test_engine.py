@@ -18,7 +18,7 @@ from gui.session.session import Session
 from gui.state import CoilKnowledge, WindowState, truth
 from gui.window import Window
 from tactile_lab.acquisition.events import RunState
-from tactile_lab.engine.commands import begin_manual, begin_run, hold, renew, stop
+from tactile_lab.engine.commands import begin_manual, begin_run, hold, renew
 from tactile_lab.engine.engine import Engine, Reply
 from tactile_lab.engine.events import Ended, Samples
 from tactile_lab.engine.jobs import read_field
@@ -169,7 +169,7 @@ def test_stop_by_hand_is_verified_and_field_is_read(pipe: Connection) -> None:
     pipe.send((1, Engine.begin, begin_manual, (request,), {}))
     pipe.send((1, Engine.say, hold, (0.1,), {}))
     hears(pipe, flows)
-    pipe.send((1, Engine.say, stop, ("enough",), {}))
+    pipe.send((1, Engine.stop, "enough", (), {}))
     ended = hears(pipe, lambda told: isinstance(told, Ended)).ending
     assert ended.state is RunState.ABORTED and ended.reason == "enough"
     assert ended.off.verified

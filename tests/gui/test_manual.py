@@ -8,6 +8,7 @@ from tactile_lab.acquisition.ending import CoilState, Ending
 from tactile_lab.acquisition.events import CoilCurrent, Message, RunState
 from tactile_lab.bench import OffReport
 from tactile_lab.engine.commands import renew
+from tactile_lab.engine.engine import Engine
 from tactile_lab.engine.events import Ended, Samples
 from tactile_lab.engine.link import RemoteTask
 
@@ -103,7 +104,7 @@ def test_the_window_answers_each_word_of_the_coil_with_its_lease(lab) -> None:
     for time in range(3):
         session.manual.take(CoilCurrent(float(time), 0.1, 0.1))
         session.manual.take(Samples({}, state))
-    assert said == [(renew,)] * 3
+    assert said == [(Engine.say, renew)] * 3
     assert session.coil_view().current == 0.1
     off = OffReport(False, None, "nobody knows")
     why = "The coil's thread ended without a word."
