@@ -371,6 +371,7 @@ def repeat(name: str, seed: int) -> dict[str, Any]:
     believed = run.belief
     assert believed is not None
     circuit, force = believed.deviating(deviation)
+    assert isinstance(force, Waveform)  # that of an hour would come in pieces
     field = believed.magnet.B2_per_ampere, core
     true = Truth(circuit, force, 1 + deviation.force, field)
     told: list[tuple[str, float, float, float, float]] = []

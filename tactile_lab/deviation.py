@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Annotated, NamedTuple
 
+from tactile_lab.long_waveform import AnyWaveform
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.temperature import at_temperature, temperature
@@ -21,15 +22,16 @@ Part = Annotated[float, Unit("", above=-1.0)]
 Later = Annotated[float, Unit("s")]
 Warmer = Annotated[float, Unit("K")]
 
-KEPT = 20_000
-"""Set-points, up to which a force is kept: behind its lags each takes 400 B."""
+KEPT = 4000
+"""Points of a set-point up to which the force is held whole, and kept: behind its lags
+each takes 1 kB."""
 
 
 class DrivenCircuit(NamedTuple):
     """A circuit, and the force on it, N."""
 
     circuit: Circuit
-    force: Waveform
+    force: AnyWaveform
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +91,7 @@ class Deviation(SceneTable):
             eddy = max(magnet.eddy_lag + self.lag, 0.0)
             magnet = replace(magnet, eddy_lag=eddy)
         brief = setpoint.time.size <= KEPT
-        force = (_force if brief else _force.__wrapped__)(magnet, setpoint)
+        force = (_force if brief else Magnet.long_force)(magnet, setpoint)
         return DrivenCircuit(
             self.circuit(circuit), force.scaled(1 + self.force) if self.force else force
         )

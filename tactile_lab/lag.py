@@ -10,6 +10,7 @@ Between two points of a piecewise-linear u both are straight lines and exponenti
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,8 @@ FINE = 2e-5
 ALIKE = 0.05
 """Lags nearer to each other than this are drawn apart by it: their exponentials would
 cancel, and only the sum of the lags is ever seen."""
+AT_ONCE = 512
+"""Points of a wave that are followed at once; each step is answered in up to 320."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +56,40 @@ class Lag:
             The field as the current that would hold it, A; and `before` for what
             comes next.
         """
+        times: list[FloatArray] = []
+        values: list[FloatArray] = []
+        for piece in self._in_turn(wave, before):
+            found, after = piece
+            # each begins where the last one ended
+            times.append(found.time[1 if times else 0 :])
+            values.append(found.value[1 if values else 0 :])
+        if len(times) > 1:
+            found = Waveform(_joined(times), _joined(values))
+        return found, after
+
+    def in_pieces(self, wave: Waveform) -> Iterator[Waveform]:
+        """What `follow` finds, in pieces that begin where the one before ended."""
+        return (found for found, _ in self._in_turn(wave, None))
+
+    def _in_turn(
+        self, wave: Waveform, before: tuple[float, float] | None
+    ) -> Iterator[tuple[Waveform, tuple[float, float]]]:
+        """Pieces of what `follow` finds, each with `before` for the next."""
         if self.coil == 0 and self.eddy == 0:
             last = float(wave.value[-1])
-            return wave, (last, last)
-        fast, slow = self._apart()
-        first = float(wave.value[0])
-        before = before or (first, first)
+            yield wave, (last, last)
+            return
+        before = before or (wave.first, wave.first)
         fine = FINE * max(wave.peak, *map(abs, before), 1e-12)
+        for piece in wave.pieces(AT_ONCE):
+            found, before = self._followed(piece, before, fine)
+            yield found, before
+
+    def _followed(
+        self, wave: Waveform, before: tuple[float, float], fine: float
+    ) -> tuple[Waveform, tuple[float, float]]:
+        """As `follow`, all at once, straight pieces wrong by `fine` A at most."""
+        fast, slow = self._apart()
         lasts = np.diff(wave.time)
         pieces = lasts > 0  # the others are jumps
         start, end, lasts = wave.time[:-1][pieces], wave.time[1:][pieces], lasts[pieces]
@@ -170,6 +200,14 @@ class Lag:
         return self.coil, self.eddy
 
 
+def _joined(parts: list[FloatArray]) -> FloatArray:
+    """The parts as one array that a waveform need not copy, and no parts."""
+    whole = np.concatenate(parts)
+    whole.setflags(write=False)
+    parts.clear()
+    return whole
+
+
 def _left(since: FloatArray, lag: float) -> FloatArray:
     """What `since` s leave of a lag's decay."""
     return np.exp(-since / lag) if lag > 0 else np.zeros(since.size)
@@ -196,6 +234,7 @@ def _bends(
     nth = np.arange(1, counts.sum() + 1) - np.repeat(np.cumsum(counts) - counts, counts)
     part = nth * np.repeat(covered / np.maximum(counts, 1), counts)
     times = np.repeat(start, counts) - 2 * lag * np.log1p(-part)
+    times = np.minimum(times, np.repeat(end, counts))  # which rounding goes beyond
     # what is left then would be stretched over the rest of a long piece
     gone = np.minimum(end, start + lag * np.log(1e4 * size))
     return np.concatenate([times, gone])

@@ -18,6 +18,7 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.calibration import Calibration, CalibrationFile
 from tactile_lab.errors import LimitError, ParameterError
 from tactile_lab.lag import Lag
+from tactile_lab.long_waveform import LongWaveform
 from tactile_lab.quantity import Unit, show
 from tactile_lab.table import SceneTable
 from tactile_lab.waveform import Waveform
@@ -250,6 +251,12 @@ class Magnet(SceneTable):
         """
         field, after = self.lag.follow(setpoint, before)
         return self.force_for(field, beyond="hold"), after
+
+    def long_force(self, setpoint: Waveform) -> LongWaveform:
+        """What `lagged_force` gives, in pieces."""
+        return LongWaveform(lambda: self.lag.in_pieces(setpoint)).each(
+            lambda field: self.force_for(field, beyond="hold")
+        )
 
     def _bounds(self, limit: float) -> str:
         if self.calibration is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -36,8 +36,7 @@ class Waveform:
     value: FloatArray
 
     def __post_init__(self) -> None:
-        time = np.array(self.time, dtype=np.float64, ndmin=1)
-        value = np.array(self.value, dtype=np.float64, ndmin=1)
+        time, value = _own(self.time), _own(self.value)
         if time.ndim != 1 or time.shape != value.shape or time.size == 0:
             raise ParameterError(
                 f"A waveform needs as many values as times, at least one; got shapes "
@@ -168,6 +167,23 @@ class Waveform:
         )
         return value
 
+    def pieces(self, points: int) -> Iterator[Waveform]:
+        """Consecutive parts that begin with the point the one before ends with.
+
+        Args:
+            points: that each has at most, beside that one.
+        """
+        if self.time.size <= points + 1:
+            yield self
+            return
+        for start in range(0, self.time.size - 1, points):
+            part = slice(start, start + points + 1)
+            yield Waveform(self.time[part], self.value[part])
+
+    def each(self, change: Callable[[Waveform], Waveform]) -> Waveform:
+        """What `change` makes of it, as a `LongWaveform` changes each of its pieces."""
+        return change(self)
+
     def arrival(self, at: float, since: float) -> float:
         """When it came within `NEAR` of the value it has at `at` s, to stay, s.
 
@@ -176,7 +192,7 @@ class Waveform:
             since: nothing before is looked at; the answer where it stayed near, s.
         """
         held = float(self.at(at))
-        inside = (self.time >= since) & (self.time <= at)
+        inside = self._between(since, at)
         away = np.flatnonzero(np.abs(self.value[inside] - held) > NEAR * abs(held))
         if not away.size:
             return since
@@ -193,7 +209,7 @@ class Waveform:
             until: nothing beyond is looked at, s.
             near: part of its largest change.
         """
-        inside = (self.time >= since) & (self.time <= until)
+        inside = self._between(since, until)
         times, values = self.time[inside], self.value[inside]
         if not times.size:
             return None
@@ -203,6 +219,11 @@ class Waveform:
             return None
         first = int(np.argmax(apart > near * apart.max()))
         return float(times[first - 1]) if first > 0 else since
+
+    def _between(self, since: float, until: float) -> slice:
+        """The points from `since` to `until` s, both included."""
+        first = int(np.searchsorted(self.time, since))
+        return slice(first, int(np.searchsorted(self.time, until, side="right")))
 
     def segments(self) -> Iterator[tuple[float, float, float, float]]:
         """Each (start s, end s, value at start, value at end); jumps have no length."""
@@ -280,3 +301,16 @@ class Waveform:
 
     def __hash__(self) -> int:
         return hash((self.time.tobytes(), self.value.tobytes()))
+
+
+def _own(numbers: ArrayLike) -> FloatArray:
+    """A copy that nobody else changes; another waveform's is nobody's to change."""
+    if (
+        isinstance(numbers, np.ndarray)
+        and numbers.dtype == np.float64
+        and numbers.ndim == 1
+        and numbers.base is None
+        and not numbers.flags.writeable
+    ):
+        return numbers
+    return np.array(numbers, dtype=np.float64, ndmin=1)

@@ -57,6 +57,21 @@ def test_slices_follow_as_the_whole_does():
     assert state == pytest.approx(after, abs=1e-12)
 
 
+@pytest.mark.parametrize("points", [1, 2, 7])
+def test_a_long_wave_is_followed_in_pieces_as_at_once(points, monkeypatch):
+    lag, steps = Lag(1.1e-3, 3e-3), np.arange(1, 40)
+    stairs = Waveform.stairs(np.column_stack([steps * 0.01, np.sin(steps)]), 0.45)
+    whole, after = lag.follow(stairs)
+    monkeypatch.setattr("tactile_lab.lag.AT_ONCE", points)
+    found, left = lag.follow(stairs)
+    assert found == whole
+    assert left == after
+    pieces = list(lag.in_pieces(stairs))
+    assert len(pieces) >= stairs.time.size // points - 1
+    assert all(one.end == after.start for one, after in pairwise(pieces))
+    assert sum(piece.time.size - 1 for piece in pieces) == whole.time.size - 1
+
+
 def test_after_a_while_at_rest_there_is_exactly_nothing():
     push = Waveform.through([(0, 0), (0, 1), (0.5, 1), (0.5, 0), (1, 0)])
     found, after = Lag(1.1e-3, 3e-3).follow(push)

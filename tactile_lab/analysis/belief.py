@@ -13,6 +13,7 @@ from tactile_lab.analysis.estimate import Z95
 from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import Followers
 from tactile_lab.deviation import Deviation, DrivenCircuit
+from tactile_lab.long_waveform import AnyWaveform
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.waveform import Waveform
@@ -68,7 +69,7 @@ class Belief:
         return self.deviating(NOWHERE)
 
     @property
-    def force(self) -> Waveform:
+    def force(self) -> AnyWaveform:
         """Force on the sensor, N on the run's time axis."""
         return self.driven.force
 
@@ -125,9 +126,7 @@ class Belief:
         later, pushed = by.pop("clock", 0.0), by.pop("push", 0.0)
         circuit, force = self.deviating(Deviation(**by))
         if pushed:
-            # at rest there is no force, by definition
-            rest = np.abs(force.value) < STEADY
-            force = Waveform(force.time, force.value + np.where(rest, 0.0, pushed))
+            force = force.each(lambda piece: _pushed(piece, pushed))
         if later:
             force = force.shifted(later).since(0.0)
         return DrivenCircuit(circuit, force)
@@ -168,3 +167,9 @@ class Belief:
             self.bands, part * np.eye(len(self.bands)), strict=True
         ):
             yield cause, self.moved(parts)
+
+
+def _pushed(force: Waveform, by: float) -> Waveform:
+    """With `by` N more, but at rest, where by definition there is no force."""
+    rest = np.abs(force.value) < STEADY
+    return Waveform(force.time, force.value + np.where(rest, 0.0, by))

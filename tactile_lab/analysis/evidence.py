@@ -26,9 +26,9 @@ from tactile_lab.analysis.firing import Firing, charging, steps_between
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
+from tactile_lab.long_waveform import AnyWaveform
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.slices import Samples, slices
-from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
     from tactile_lab.model.solution import Solution
@@ -56,7 +56,7 @@ class Residuals:
         self,
         circuit: Circuit,
         names: tuple[str, ...],
-        force: Waveform,
+        force: AnyWaveform,
         duration: float,
         V_C1: Measured | None,
         spike_times: FloatArray | None,
@@ -105,7 +105,7 @@ class Residuals:
     def under(self, driven: DrivenCircuit) -> FloatArray:
         """All residuals of a circuit and its force, V: of V_C1, then at firing."""
         trace, until = self._trace, self._duration
-        firing = Firing(driven, self._earlier, self._straight, until)
+        firing = Firing(driven.circuit, self._earlier, self._straight, until)
         seen = None if trace is None else trace.samples(until)
         if seen is None and not firing.misses.size:
             return np.empty(0)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import I_C
 
@@ -32,7 +31,7 @@ class Firing:
     Taken from slices that keep V_C1, as they come.
 
     Args:
-        driven: circuit and force of the slices.
+        circuit: of the slices.
         earlier: of each pair the earlier spike, s, ascending.
         straight: of each, ends and middles of steps to the later one.
         until: end of the last slice, s.
@@ -43,13 +42,13 @@ class Firing:
 
     def __init__(
         self,
-        driven: DrivenCircuit,
+        circuit: Circuit,
         earlier: FloatArray,
         straight: Sequence[FloatArray],
         until: float,
     ) -> None:
-        self._circuit, self._bends = driven.circuit, driven.force.time
-        self._earlier, self._straight, self._until = earlier, straight, until
+        self._circuit, self._until = circuit, until
+        self._earlier, self._straight = earlier, straight
         self._later = np.array([grid[-1] for grid in straight])
         self._parts: list[Solution] = []
         self._taken, self.misses = 0, np.empty(len(straight))
@@ -82,7 +81,8 @@ class Firing:
 
     def _between(self, pairs: slice) -> list[FloatArray]:
         """Their steps, parted where the force bends."""
-        bends, straight = self._bends, self._straight[pairs]
+        bends = np.concatenate([part.force.time for part in self._parts])
+        straight = self._straight[pairs]
         first = np.searchsorted(bends, self._earlier[pairs], side="right")
         last = np.searchsorted(bends, self._later[pairs])
         return [

@@ -27,9 +27,9 @@ from tactile_lab.analysis.evidence import (
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError, ParameterError
+from tactile_lab.long_waveform import AnyWaveform
 from tactile_lab.model.circuit import PARAMETERS, Circuit, units
 from tactile_lab.quantity import printed
-from tactile_lab.waveform import Waveform
 
 ALIKE = 0.98
 """Two parameters whose estimates correlate more than this are hardly told apart."""
@@ -87,7 +87,7 @@ class Evidence:
     """
 
     circuit: Circuit
-    force: Waveform
+    force: AnyWaveform
     duration: float
     V_C1: Measured | None = None
     spike_times: FloatArray | None = None
@@ -98,7 +98,7 @@ class Evidence:
 def identify(
     circuit: Circuit,
     names: Sequence[str],
-    force: Waveform,
+    force: AnyWaveform,
     duration: float,
     *,
     V_C1: Measured | None = None,

@@ -13,11 +13,11 @@ from tactile_lab.analysis.spike_pairs import Matched, by_cause, match, together
 from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import ParameterError
+from tactile_lab.long_waveform import AnyWaveform
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import ErrorEstimate
 from tactile_lab.model.slices import Samples, slices
 from tactile_lab.model.state import Start
-from tactile_lab.waveform import Waveform
 
 NARROW, WITHIN = 1e-3, 8
 """A signal hardly bends within bins narrower than this, s; in others the model's mean
@@ -130,7 +130,7 @@ class Twin:
 
 def twin(
     circuit: Circuit,
-    force: Waveform,
+    force: AnyWaveform,
     duration: float,
     *,
     voltages: Sequence[Measured] = (),

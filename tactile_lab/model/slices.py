@@ -7,11 +7,13 @@ slices are what one long solution would be.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
+from tactile_lab.long_waveform import AnyWaveform
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import asked, solver, state_at_start
 from tactile_lab.model.state import Start
@@ -26,7 +28,7 @@ POINTS = 1 << 14
 
 def slices(
     circuit: Circuit,
-    force: Waveform,
+    force: AnyWaveform,
     *,
     keep: Sequence[str],
     until: float,
@@ -49,14 +51,23 @@ def slices(
         ParameterError: a bad option or waveform.
         SolverError: the model cannot answer to that tolerance.
     """
-    need, tolerance = asked(circuit, force, keep, until, tolerance)
-    state = state_at_start(circuit, force.first, start)
-    cuts = np.unique(force.time[POINTS::POINTS])
-    for end in (*cuts[(cuts > 0) & (cuts < until)].tolist(), until):
+    pieces = force.pieces(POINTS)
+    first = next(pieces)
+    need, tolerance = asked(circuit, first, keep, until, tolerance)
+    state = state_at_start(circuit, first.first, start)
+
+    def solved(piece: Waveform, end: float) -> Solution:
         begin = solver().start_from(circuit, state)
-        found = solver().solve(begin, force, end, need, tolerance)
-        state = found.after
-        yield found
+        found: Solution = solver().solve(begin, piece, end, need, tolerance)
+        return found
+
+    for piece in chain((first,), pieces):
+        if piece.end > state.time:
+            yield (part := solved(piece, min(piece.end, until)))
+            state = part.after
+        if state.time >= until:
+            return
+    yield solved(Waveform.constant(float(piece.value[-1])), until)
 
 
 class Samples:

@@ -150,7 +150,7 @@ def _by_scope(driven: DrivenCircuit, fast: float, *, stretched: bool) -> DrivenC
     circuit, force = driven
     longer = {name: getattr(circuit, name) * (1 + fast) for name in ("tau", "C1", "C2")}
     if stretched:
-        force = Waveform(force.time * (1 + fast), force.value)
+        force = force.each(lambda w: Waveform(w.time * (1 + fast), w.value))
     return DrivenCircuit(replace(circuit, **longer), force)
 
 

@@ -20,11 +20,14 @@ from tactile_lab.quantity import show
 from tactile_lab.report.splice import ClosedTime
 from tactile_lab.spikes.rate import rates_between
 from tactile_lab.trace import Trace
+from tactile_lab.waveform import Waveform
 
 SHARP = {"V_C2", "V_K"}
 """Signals that jump within a bin: their extremes are the trace, not their mean."""
 DRAWN_BINS = 1600
 """More bins, or columns with corners, than can be printed only swell the file."""
+AT_ONCE = 1 << 14
+"""Points of the force that are looked at at once."""
 
 Told = tuple[Panel, str]
 """A panel, and what its caption says of it."""
@@ -90,10 +93,9 @@ def overranges(signals: list[RecordedSignal], axis: ClosedTime) -> list[Guide]:
 
 
 def _force(run: Measurement, axis: ClosedTime) -> Told:
-    time = axis.closed(np.append(run.force.time, max(run.duration, run.force.end)))
-    force = np.append(run.force.value, run.force.value[-1])
-    drawn = Trace.line(time, force).corners(DRAWN_BINS)
-    time, force = drawn.time, drawn.mean
+    time, force = _outline(run.force, axis)
+    time = np.append(time, axis.at(max(run.duration, run.force.end)))
+    force = np.append(force, run.force.value[-1])
     low = high = None
     if run.force_uncertainty is not None:
         # only where there is a force: at rest its zero is a definition
@@ -132,6 +134,17 @@ def _force(run: Measurement, axis: ClosedTime) -> Told:
         steps = "points of the waveform played" if run.listed else "source's set-points"
         text += f"; its steps are the {steps}"
     return panel, text
+
+
+def _outline(force: Waveform, axis: ClosedTime) -> tuple[FloatArray, FloatArray]:
+    """The corners of a line that can be seen, on the closed axis, s and N."""
+    corners = []
+    for piece in force.pieces(AT_ONCE):
+        part = (piece.end - piece.start) / (force.end - force.start or 1.0)
+        line = Trace.line(axis.closed(piece.time), piece.value)
+        corners.append(line.corners(max(1, round(part * DRAWN_BINS))))
+    time, value = zip(*((each.time, each.mean) for each in corners), strict=True)
+    return np.concatenate(time), np.concatenate(value)
 
 
 def _voltages(

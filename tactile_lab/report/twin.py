@@ -74,7 +74,7 @@ def with_twin(run: RunData) -> tuple[RunData, BesideModel | None]:
         spike_times=run.spike_times if run.searched else None,
         pauses=pauses,
         start=run.start,
-        displaced=tuple(believed.displaced()),
+        displaced=believed.displaced(),
     )
     budgets = {
         "spike times": spike_time_budget(found, believed),

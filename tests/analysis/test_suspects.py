@@ -12,7 +12,7 @@ from tactile_lab.analysis.suspects import SUSPECTS, Explanation, Suspect, explai
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.bench import Followers
 from tactile_lab.deviation import Deviation
-from tactile_lab.magnetics import Magnet
+from tactile_lab.magnetics import ForceUncertainty, Magnet
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.waveform import Waveform
@@ -176,3 +176,20 @@ def test_the_force_of_a_long_run_is_not_kept_when_none_needs_it(seconds, kept):
     stairs = Waveform.stairs(np.column_stack([time, time % 0.3]), seconds)
     force = ref(Deviation().driven(Circuit(), MAGNET, stairs).force)
     assert (force() is not None) is kept
+
+
+@pytest.mark.parametrize("clock", [-0.3, 0.0, 0.3])
+def test_the_force_of_a_long_run_is_in_pieces_what_it_is_at_once(clock, monkeypatch):
+    known = ForceUncertainty(2e-3, 0.04)
+    monkeypatch.setattr(Magnet, "force_uncertainty", known)
+    parts = np.array([clock / BELIEF.clock, 0.4, 0.3, -0.2, 0.1])
+    moved = replace(BELIEF).moved(parts)
+    monkeypatch.setattr("tactile_lab.deviation.KEPT", 0)
+    monkeypatch.setattr("tactile_lab.lag.AT_ONCE", 3)
+    circuit, force = replace(BELIEF).moved(parts)
+    assert circuit == moved.circuit
+    pieces = list(force.pieces(50))
+    assert len(pieces) > 5
+    time = [pieces[0].time[:1], *(piece.time[1:] for piece in pieces)]
+    value = [pieces[0].value[:1], *(piece.value[1:] for piece in pieces)]
+    assert Waveform.tidied(np.concatenate(time), np.concatenate(value)) == moved.force

@@ -14,6 +14,7 @@ from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.analysis.twin import Measured, twin
 from tactile_lab.deviation import DrivenCircuit
 from tactile_lab.errors import ParameterError
+from tactile_lab.long_waveform import LongWaveform
 from tactile_lab.model import slices
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
@@ -71,6 +72,17 @@ def test_a_long_force_is_compared_in_the_memory_of_a_slice(compared, monkeypatch
     assert np.array_equal(found, at_once)
     assert np.array_equal(found, warm)
     assert sliced < 0.4 * whole
+
+
+def test_a_force_in_pieces_is_compared_as_the_whole():
+    pieces = LongWaveform(lambda: SWINGING.pieces(40_000))
+    made = [
+        twin(Circuit(), one, 31.0, voltages=[SEEN], spike_times=SPIKES)
+        for one in (SWINGING, pieces)
+    ]
+    one, other = (each.residuals[0].predicted for each in made)
+    assert np.array_equal(one, other)
+    assert np.array_equal(made[0].spikes.offsets, made[1].spikes.offsets)
 
 
 def test_the_mean_of_a_bin_is_compared_with_the_model_s_mean():
