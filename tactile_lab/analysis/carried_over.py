@@ -40,6 +40,8 @@ def carried_over(
         force: of the whole run, N against s.
         trials: in order; those that begin under a force are passed over.
     """
+    if not circuit.k_F:
+        return None  # a film that no force charges remembers none
     film, at, from_none = Film(circuit), 0, 0
     late: list[tuple[float, float, Begun]] = []
     for trial in trials:

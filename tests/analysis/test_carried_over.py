@@ -51,3 +51,9 @@ def test_what_is_left_is_what_the_model_has_in_its_film(ramp):
 def test_nothing_is_told_of_a_trial_from_rest_nor_of_a_stair(force, second):
     trials = [Begun("a", 0.0, 0.1), Begun("b", second, 0.2)]
     assert carried_over(Circuit(), force, trials) is None
+
+
+def test_a_film_that_no_force_charges_remembers_none():
+    force = Waveform.pulse(0.15, **PULSE, rest=2.0).then(Waveform.pulse(0.2, **PULSE))
+    trials = [Begun("a", 0.0, 0.15), Begun("b", 4.5, 0.2)]
+    assert carried_over(Circuit(g31=0.0), force, trials) is None
