@@ -5,14 +5,16 @@
 The window stands on a virtual screen. In turn it is made to run, queue, edit, stop,
 meet a fault (a source that falls silent, one that answers late, a pulled plug), find
 back, compare and export; between these, keys and clicks at random places and on random
-buttons, from one seed. Engine and simulated far ends are in the window's process, so
-that the source itself is the witness of what the window says.
+buttons, from one seed. The engine is a process of its own, as in life, and the
+simulated source in it the witness: it tells when its output went on and off.
 
 It ends with 1 where an exception came, where the window said that the coil is off, or
 was ready, for over two seconds while the output was on, where it was ready without
-knowing the coil, where a key STOP left the output on for five seconds, where the
-program ended, or where its memory grew by more than a fifth from the second quarter of
-the session to the last.
+knowing the coil, where a STOP left the output on for five seconds, where the program
+ended, or where the window's memory grew by more than a fifth from the second quarter
+of the session to the last. The row has the time from STOP to the output off, the ramp
+and what `xdotool` takes included; of a STOP that came late it is told how much of it
+threads waited for a processor.
 """
 
 import argparse
@@ -25,16 +27,21 @@ import sys
 import tempfile
 import threading
 import time
+from bisect import bisect
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import watched_engine
 
-PROGRAM = Path(__file__).resolve().with_name("window_watched.py")
+HERE = Path(__file__).resolve().parent
+PROGRAM = "import window_watched; window_watched.main()"
 SIZE = 1366, 768
 LIE, STOPPED, PRESSED, TRIES = 2.0, 5.0, 5.0, 3
+LONGEST = 30.0
+"""For which an output that STOP left on is watched, s."""
 LINES = 30
 """Of the window's log that are told where the session was lost."""
 KEYS = (
@@ -58,10 +65,17 @@ LEFT_ALONE = (
 
 Report = dict[str, Any]
 """What the program tells every tenth of a second."""
+
+Switched = tuple[float, bool, str]
+"""When an output went on or off, and of which source."""
+
+Times = tuple[float, float]
+"""For how long a thread worked, and waited for a processor, s."""
 HEAD = (
     "| seed | s | rounds | keys, clicks, drags | memory in its second quarter, MB "
-    "| in its last | longest pause of the window, s | problems |\n"
-    "|---|---|---|---|---|---|---|---|"
+    "| in its last | longest pause of the window, s | STOP to output off, s | most "
+    "| problems |\n"
+    "|---|---|---|---|---|---|---|---|---|---|"
 )
 NOTHING: Report = {
     "state": "",
@@ -77,6 +91,13 @@ class LostError(Exception):
     """The session cannot go on."""
 
 
+def times(process: int, threads: Iterable[int]) -> Times:
+    """Of threads of a process together, as the scheduler counts them."""
+    each = [Path(f"/proc/{process}/task/{one}/schedstat") for one in threads]
+    told = [tuple(map(int, one.read_text().split())) for one in each if one.exists()]
+    return sum(one[0] for one in told) / 1e9, sum(one[1] for one in told) / 1e9
+
+
 class Session:
     """The program on its screen, and the one who drives it."""
 
@@ -85,6 +106,8 @@ class Session:
         self.folder = folder
         self.problems: list[str] = []
         self.reports: list[Report] = []
+        self.switched: list[Switched] = [(0.0, False, "no source")]
+        self.stops: list[float] = []
         self.log: deque[str] = deque(maxlen=LINES)
         self.done: dict[str, int] = {}
         read, write = os.pipe()
@@ -112,8 +135,8 @@ class Session:
             subprocess.Popen(["openbox"], env=self.env, stderr=subprocess.DEVNULL)
         )
         self.program = subprocess.Popen(
-            [sys.executable, str(PROGRAM), str(folder)],
-            env=self.env, cwd=folder, text=True,
+            [sys.executable, "-c", PROGRAM],
+            env={**self.env, "PYTHONPATH": str(HERE)}, cwd=folder, text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         )  # fmt: skip
         self._started.append(self.program)
@@ -143,9 +166,25 @@ class Session:
         """What the program told last."""
         return self.reports[-1] if self.reports else NOTHING
 
+    @property
+    def output(self) -> bool:
+        """Whether the source's output is on, as the source told last."""
+        return self.switched[-1][1]
+
+    def look(self) -> None:
+        """Take what the source has told since: when it went on and off."""
+        file = self.folder / watched_engine.SOURCE
+        lines = file.read_text().splitlines() if file.exists() else []
+        for line in lines[len(self.switched) - 1 :]:
+            told = json.loads(line)
+            self.switched.append((told["at"], told["on"], told["name"]))
+
     def wait(self, done: Callable[[], object], longest: float, what: str) -> None:
         end = time.monotonic() + longest
-        while not done():
+        while True:
+            self.look()
+            if done():
+                return
             if self.program.poll() is not None:
                 raise LostError(f"the program ended with {self.program.returncode}")
             if time.monotonic() > end:
@@ -179,6 +218,18 @@ class Session:
         self.program.stdin.write(f"{word}\n")
         self.program.stdin.flush()
 
+    def fail(self, how: str) -> None:
+        """Have the source fail from now on; "" lets it work again."""
+        (self.folder / watched_engine.FAULT).write_text(how)
+
+    def processor(self) -> tuple[Times, Times]:
+        """Of the window's own thread, and of the engine's together, so far."""
+        window = times(self.program.pid, [self.program.pid])
+        engine = self.now.get("engine")
+        if not engine:
+            return window, (0.0, 0.0)
+        return window, times(engine, map(int, os.listdir(f"/proc/{engine}/task")))
+
     # --- what a person does
 
     def anything(self, seconds: float) -> None:
@@ -210,7 +261,7 @@ class Session:
     def clear(self) -> None:
         """Stop what is in progress, close what is open, and be ready."""
         self.tool("keyup", "shift", "keyup", "ctrl", "mouseup", 1)
-        self.tell("mend")
+        self.fail("")
         self.restore()
 
         def ready() -> bool:
@@ -261,7 +312,7 @@ class Session:
             here = self.now
             if here["state"] == "ready" and here["at"] - pressed > PRESSED:
                 pressed = here["at"] if self.press("Run") else pressed
-            return here["output"] or here["state"] == "fault" or came_late()
+            return self.output or here["state"] == "fault" or came_late()
 
         def came_late() -> bool:  # of the keys before
             return bool(self.now["open"] or self.now["dialogs"])
@@ -274,23 +325,34 @@ class Session:
             )
             pressed = float("-inf")
             self.wait(runs, 90, "running with the coil on")
-            if self.now["output"]:
+            if self.output:
                 return
         raise LostError(f"no run in {TRIES} tries; it is {self.now['state']}")
 
     def stop(self) -> None:
         """STOP by key or button, and see to it that the output goes off."""
         how = self.random.choice(("F12", "Escape", "button"))
-        place = self.now["stop"]
+        place, before = self.now["stop"], self.processor()
+        self.look()
+        was_on, begun = self.output, time.monotonic()
         if how == "button":
             self.tool("mousemove", *place, "click", 1)
         else:
             self.key("F12" if how == "F12" else "Escape")
-        begun = time.monotonic()
-        while self.now["output"] and time.monotonic() < begun + STOPPED:
-            time.sleep(0.05)
-        if self.now["output"]:
-            self.problems.append(f"{how} left the output on for {STOPPED} s")
+        pressed = time.monotonic()
+        while self.output and time.monotonic() < pressed + LONGEST:
+            self.look()
+            time.sleep(0.02)
+        if not was_on:
+            return
+        self.stops.append(self.switched[-1][0] - begun)
+        if self.output or self.switched[-1][0] > pressed + STOPPED:
+            used = np.subtract(self.processor(), before)
+            self.problems.append(
+                f"{how} left the output on for {self.stops[-1]:.1f} s, in which the "
+                f"window's thread worked {used[0, 0]:.2f} s and waited {used[0, 1]:.2f}"
+                f" for a processor, the engine's {used[1, 0]:.2f} and {used[1, 1]:.2f}"
+            )
 
     def round(self) -> None:
         """All that a session holds, once."""
@@ -299,7 +361,7 @@ class Session:
         self.anything(8)
         self.stop()
         self.begin()
-        self.tell(f"fault {self.random.choice(FAULTS)}")
+        self.fail(self.random.choice(FAULTS))
         self.anything(6)
         self.clear()
         self.begin()
@@ -329,12 +391,12 @@ class Session:
                 process.wait(30)
 
 
-def lies(reports: list[Report]) -> list[str]:
+def lies(reports: list[Report], switched: list[Switched]) -> list[str]:
     """Where the window said for longer than `LIE` what the source contradicts."""
     found = []
     begun: dict[str, float] = {}
     for told in reports:
-        on = told["output"]
+        _, on, name = switched[bisect(switched, (told["at"], True)) - 1]
         ready = told["state"] == "ready" and not told["manual"]
         claims = {
             "the coil is off while its output is on": on and told["truth"] == "off",
@@ -346,7 +408,7 @@ def lies(reports: list[Report]) -> list[str]:
                 begun.pop(claim, None)
             elif told["at"] - begun.setdefault(claim, told["at"]) > LIE:
                 at = f"at {told['at'] - reports[0]['at']:.0f} s"
-                found.append(f"{claim}, {at} of {told['source']}: {told['words']}")
+                found.append(f"{claim}, {at} of {name}: {told['words']}")
                 begun[claim] = float("inf")
     return found
 
@@ -365,7 +427,8 @@ def drive(seed: int, seconds: float) -> tuple[str, bool]:
             session.problems += [str(lost), *session.log]
         finally:
             session.close()
-    session.problems += lies(session.reports)
+    session.look()
+    session.problems += lies(session.reports, session.switched)
     memory = np.array([told["memory"] for told in session.reports])
     quarter = max(len(memory) // 4, 1)
     before, after = (
@@ -376,10 +439,12 @@ def drive(seed: int, seconds: float) -> tuple[str, bool]:
         session.problems.append(f"memory grew from {before:.0f} to {after:.0f} MB")
     lived = session.reports[-1]["at"] - session.reports[0]["at"]
     gap = max(np.diff([told["at"] for told in session.reports]))
+    stops = np.array(session.stops or [np.nan])
     acts = sum(n for what, n in session.done.items() if what != "round")
     row = (
         f"| {seed} | {lived:.0f} | {session.done.get('round', 0)} | {acts} | "
-        f"{before:.0f} | {after:.0f} | {gap:.1f} | {len(session.problems)} |"
+        f"{before:.0f} | {after:.0f} | {gap:.1f} | {np.median(stops):.2f} | "
+        f"{stops.max():.2f} | {len(session.problems)} |"
     )
     return "\n".join([row, *session.problems]), not session.problems
 

@@ -1,12 +1,13 @@
-"""The window on the simulated bench, telling what it says and what is true.
+"""The window on the simulated bench, telling what it says of the coil.
 
-    python tests/benchmarks/window_watched.py FOLDER
+    python -c "import window_watched; window_watched.main()"
 
-Driven by `window_session.py`. Every tenth of a second a line of JSON on the standard
-output tells what the window says of the coil and what the simulated source does; lines
-of the log, exceptions and what Qt complains of come as they happen. Engine and
-simulated far ends are in this process. A word a line on the standard input has the
-source fail or work again.
+Driven by `window_session.py`, in a folder of its own. Every tenth of a second a line of
+JSON on the standard output tells what the window says; lines of the log, exceptions and
+what Qt complains of come as they happen. What the simulated source does is told by the
+engine, that of `watched_engine.py`. A word a line on the standard input has the bench
+connected or the scene opened. It is imported, for the engine would import a script that
+began it, and with it the window.
 """
 
 import json
@@ -16,8 +17,8 @@ import time
 import traceback
 from pathlib import Path
 from types import TracebackType
-from typing import cast
 
+import watched_engine
 from PySide6.QtCore import (
     QMessageLogContext,
     QPoint,
@@ -35,9 +36,7 @@ from gui.look.theme import Theme
 from gui.session.log import LogLine
 from gui.session.session import Session
 from gui.window import Window
-from sim_backend.coil.source import SimCoilSource
-from sim_backend.serial_line import wires
-from sim_backend.serial_line.faults import Kind, SerialFault
+from tactile_lab.engine import link
 from tactile_lab.engine.memory import map_large, share_heap
 
 SCENE = """
@@ -51,10 +50,6 @@ rest = "1 s"
 sample_rate = "100 kS/s"
 """
 OPEN = Overlay, QMenu
-AMOUNTS = {"late": 1.0, "unplug": 2.0}
-"""Of faults that have one, s."""
-
-
 DRAGS = "QDragManager::drag in possibly invalid state"
 """A press came before Qt was back from the drag before: nothing is dragged then."""
 
@@ -88,17 +83,6 @@ def listen_to_trouble() -> None:
     qInstallMessageHandler(warned)
 
 
-def number(far: wires.FarEnd) -> int:
-    """The how many-th far end it is: they are numbered as they are plugged in."""
-    return int(far.name.rpartition("-")[2])
-
-
-def source(far: wires.FarEnd) -> SimCoilSource:
-    """The coil source that is the far end."""
-    assert isinstance(far.instrument, SimCoilSource)
-    return far.instrument
-
-
 def named(one: QWidget | None) -> str:
     """What a widget is, for who has to find out why it is open."""
     if one is None:
@@ -107,15 +91,15 @@ def named(one: QWidget | None) -> str:
 
 
 class Watched:
-    """The window, the far ends of its coil sources, and what both say."""
+    """The window, and what it says."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self) -> None:
         self.app = application(["session"])
-        self.scene = folder / "short.toml"
+        self.scene = Path.cwd() / "short.toml"
         self.scene.write_text(SCENE)
         theme = Theme("light")
         theme.apply()
-        self.session = Session(folder / "runs", separate=False)
+        self.session = Session(Path.cwd() / "runs")
         self.session.run.reports = False
         self.session.log.added.connect(self._logged)
         self.window = Window(self.session, theme)
@@ -123,22 +107,11 @@ class Watched:
         self.window.show()
         begin(self.window, str(self.scene), "sim")
         self._names: dict[str, list[int]] = {}
-        self._count, self._newest = 0, 0
+        self._count = 0
         self._timer = QTimer()
         self._timer.timeout.connect(self._report)
         self._timer.start(100)
         threading.Thread(target=self._listen, daemon=True).start()
-
-    @property
-    def coils(self) -> list[wires.FarEnd]:
-        """The newest source, while it lives: a bench connected anew has its own.
-
-        One that was unplugged stays as it was, and may outlive the one after it.
-        """
-        ends = [far for name, far in wires._far_ends.items() if "coil" in name]
-        for far in ends:
-            self._newest = max(self._newest, number(far))
-        return [far for far in ends if number(far) == self._newest]
 
     def _logged(self, line: LogLine) -> None:
         tell({"log": f"{line.at:%H:%M:%S.%f} {line.source}: {line.text}"})
@@ -176,7 +149,7 @@ class Watched:
         pages = Path("/proc/self/statm").read_text().split()[1]
         cards = [c for c in self.window.findChildren(Overlay) if c.isVisible()]
         top = [w for w in self.app.topLevelWidgets() if w.isVisible()]
-        session, coils = self.session, self.coils
+        session = self.session
         tell(
             {
                 "at": time.monotonic(),
@@ -185,29 +158,19 @@ class Watched:
                 "words": stop.words.spoken,
                 "manual": session.manual.alive,
                 "monitor": session.monitor.alive,
-                "output": any(source(far).output_on for far in coils),
-                "source": [far.name for far in coils],
                 "open": [named(w) for w in (*cards, *top) if isinstance(w, OPEN)],
                 "dialogs": [named(w) for w in top if isinstance(w, QDialog)],
                 "keyboard": self._keyboard(),
                 "stop": [at.x(), at.y()],
+                "engine": session.link.pid,
                 "memory": int(pages) * 4096 / 1e6,
                 "buttons": self._names,
             }
         )
 
     def _act(self, word: str) -> None:
-        what, _, kind = word.strip().partition(" ")
-        if what == "fault":
-            fault = SerialFault(
-                kind=cast(Kind, kind), times=None, amount=AMOUNTS.get(kind, 0.0)
-            )
-            for far in self.coils:
-                far.faults.add(fault)
-        elif what == "mend":
-            for far in self.coils:
-                far.faults.clear()
-        elif what == "connect":
+        what = word.strip()
+        if what == "connect":
             self.session.connect_bench("sim")
         elif what == "scene":
             self.window.fold(self.window.setup, False)
@@ -219,17 +182,15 @@ class Watched:
         QTimer.singleShot(0, self.app, self.app.quit)  # who drives it has gone
 
 
-def main(folder: Path) -> None:
+def main() -> None:
+    """Open the window in the working folder and stay until it is closed."""
+    vars(link)["main"] = watched_engine.main
     sys.setswitchinterval(1e-3)
     share_heap()  # as the program does
     map_large()
     listen_to_trouble()
-    watched = Watched(folder)
+    watched = Watched()
     QApplication.setQuitOnLastWindowClosed(True)
     with collected_here():
         watched.app.exec()
         watched.session.close()
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1]))
