@@ -70,7 +70,9 @@ class Session(QObject):
         self.log = Log()
         self.status = Status(self.log)
         self.link = Link(separate=separate, realtime=realtime, lost=self._engine_lost)
-        self.desk = Link(separate=separate, lost=self._desk_lost, rest=REST)
+        self.desk = Link(
+            separate=separate, lost=self._desk_lost, rest=REST, behind=True
+        )
         parts = self.link, self.status, self.log
         self.bench = ConnectedBench(
             *parts, lambda: self._free and not self.monitor.alive

@@ -102,6 +102,8 @@ class Link:
         lost: told why where the engine has died, when the link is polled.
         rest: time, s, after which an engine of which nothing is asked ends, when the
             link is polled; what is asked next starts another. None keeps it.
+        behind: it is asked for nothing that holds instruments: on a busy computer it
+            comes after who does.
     """
 
     def __init__(
@@ -111,7 +113,9 @@ class Link:
         realtime: bool = True,
         lost: Callable[[str], None] = lambda why: None,
         rest: float | None = None,
+        behind: bool = False,
     ) -> None:
+        self._behind = behind
         self._rest, self._used = rest, time.monotonic()
         self._separate, self._realtime, self._lost = separate, realtime, lost
         self._pipe: Connection | None = None
@@ -250,7 +254,9 @@ class Link:
     def _open(self) -> None:
         self._pipe, theirs = multiprocessing.Pipe()
         if self._separate:
-            self._process = EngineProcess(main, theirs, realtime=self._realtime)
+            self._process = EngineProcess(
+                main, theirs, realtime=self._realtime, behind=self._behind
+            )
         else:
             served = Engine(theirs, realtime=self._realtime)
             self._process = start(served.serve, "engine")

@@ -23,6 +23,9 @@ if FORKS:
 
 Serve = Callable[[Connection, bool], None]
 
+BEHIND = 5
+"""Niceness of what works beside runs: on a busy computer a third of their share."""
+
 
 def load_ahead() -> None:
     """Begin to load what engines need, in a process beside this; returns at once."""
@@ -38,12 +41,16 @@ class EngineProcess:
         serve: what it does: with its end of the pipe, and `realtime`.
         pipe: its end; closed here once it has it, or could not be started.
         realtime: pace a simulated bench by the wall clock.
+        behind: it holds no instrument, and comes after those that do.
     """
 
-    def __init__(self, serve: Serve, pipe: Connection, *, realtime: bool) -> None:
+    def __init__(
+        self, serve: Serve, pipe: Connection, *, realtime: bool, behind: bool = False
+    ) -> None:
         self._pipe = pipe
+        asked = dict(os.environ), serve, pipe, realtime, behind
         self._process = CONTEXT.Process(
-            target=_main, args=(dict(os.environ), serve, pipe, realtime), daemon=True
+            target=_main, args=asked, daemon=True
         )  # daemonic: a window that ends without `close` still sends it SIGTERM
         self._starting = threading.Thread(target=self._start, name="start", daemon=True)
         self._starting.start()
@@ -73,10 +80,22 @@ class EngineProcess:
             self._pipe.close()
 
 
+def step_back() -> None:
+    """Have this process, and what it starts, leave the processor to runs."""
+    if hasattr(os, "nice"):
+        os.nice(BEHIND)
+
+
 def _main(
-    environment: Mapping[str, str], serve: Serve, pipe: Connection, realtime: bool
+    environment: Mapping[str, str],
+    serve: Serve,
+    pipe: Connection,
+    realtime: bool,
+    behind: bool,
 ) -> None:
     """Serve in the environment of who asked, which the one forked from may not have."""
+    if behind:
+        step_back()
     os.environ.clear()
     os.environ.update(environment)
     serve(pipe, realtime)

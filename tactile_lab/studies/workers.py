@@ -26,6 +26,7 @@ from threading import Thread
 from typing import NamedTuple, Protocol
 
 from tactile_lab.engine.cluster import cluster
+from tactile_lab.engine.process import step_back
 from tactile_lab.errors import LinkLostError, SceneError
 from tactile_lab.studies.points import Points, PointTask
 from tactile_lab.studies.shelf import Batch, Shelf, put
@@ -246,7 +247,11 @@ class _Processes(ProcessPoolExecutor):
 
 
 def _end_when(told: Connection) -> None:
-    """Let this process end when it is told to, or the one that began it is killed."""
+    """Let this process end when it is told to, or the one that began it is killed.
+
+    Whatever holds instruments on this computer comes before it.
+    """
+    step_back()
     parent = parent_process()
     if parent is not None:
         ends: list[Connection | int] = [told, parent.sentinel]

@@ -28,6 +28,10 @@ def parent_of(engine: Engine) -> int:
     return os.getppid()
 
 
+def niceness(engine: Engine) -> int:
+    return os.nice(0)
+
+
 def word(engine: Engine) -> str | None:
     return os.environ.get("A_WORD")
 
@@ -38,8 +42,10 @@ def loaded(engine: Engine) -> bool:
 
 @forks
 def test_an_engine_has_what_it_needs_and_the_next_shares_it():
-    with Link() as one, Link() as other:
+    with Link() as one, Link(behind=True) as other:
         assert answered(one, loaded).value
+        nice = [answered(link, niceness).value for link in (one, other)]
+        assert nice[1] - nice[0] == process.BEHIND  # what works beside a run
         parents = {answered(link, parent_of).value for link in (one, other)}
         assert len(parents) == 1 and os.getpid() not in parents
         assert answered(one, pid_of).value != answered(other, pid_of).value
