@@ -16,8 +16,13 @@ from pathlib import Path
 from tactile_lab.errors import RecordingError, TactileLabError
 
 
-def check_space(path: Path, needed: int) -> None:
+def check_space(path: Path, needed: int, what: str = "") -> None:
     """Refuse when the disk under `path` has fewer than `needed` bytes free.
+
+    Args:
+        path: a folder.
+        needed: bytes.
+        what: they are needed for, where that is more than a file.
 
     Raises:
         RecordingError: too little room.
@@ -25,9 +30,17 @@ def check_space(path: Path, needed: int) -> None:
     free = shutil.disk_usage(path).free
     if free < needed:
         raise RecordingError(
-            f"{path} has {free / 1e9:.2f} GB free but {needed / 1e9:.2f} GB are needed "
-            "(run and reserve). Free some space, choose another --out, or record less."
+            f"The disk of {path} has {_size(free)} free but {_size(needed)} are needed"
+            f"{what and f' {what}'}. Free some space, or write to another disk."
         )
+
+
+def _size(number: int) -> str:
+    """A number of bytes for a person."""
+    for unit, scale in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if number >= scale:
+            return f"{number / scale:.3g} {unit}"
+    return f"{number} B"
 
 
 @contextmanager

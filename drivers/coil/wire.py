@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import statistics
 
+from drivers.serial_line.failures import gathered
 from drivers.serial_line.source_wire import RECONNECT, VERIFICATIONS, SourceWire
 from tactile_lab.bench import Lowered, OffReport
 from tactile_lab.errors import BadReplyError, TactileLabError
@@ -115,7 +116,7 @@ class CoilWire(SourceWire[CoilDialect]):
         trouble: list[str] = []
         fall: list[Lowered] = []
         if not self.reconnected(trouble, RECONNECT):
-            return OffReport(False, None, UNKNOWN + " | ".join(trouble))
+            return OffReport(False, None, UNKNOWN + gathered(trouble))
         if ramp and setpoint != 0.0:
             self._ramp_down(setpoint, rested, slew, exchange, trouble, fall)
         row = self.dialect
@@ -149,7 +150,7 @@ class CoilWire(SourceWire[CoilDialect]):
                 return OffReport(True, current, text, tuple(fall))
             disobeys, state = True, "on" if on else "off"
             trouble.append(f"read-back: output {state}, {show(current, 'A')}")
-        text = UNKNOWN + " | ".join(dict.fromkeys(trouble))
+        text = UNKNOWN + gathered(trouble)
         return OffReport(False, current, text, tuple(fall))
 
     def _taken_over(self) -> float:

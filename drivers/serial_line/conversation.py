@@ -190,8 +190,9 @@ class Conversation(Generic[D]):
             value = self.parsed(answer, pattern)
         if value is None:
             raise BadReplyError(
-                f"The answer {answer!r} to {line!r} is no number in the dialect "
-                f'"{self.dialect.id}".'
+                f"The {self.link.what} at {self.link.port} answered {answer!r} to "
+                f'{line!r}, twice: no number in its dialect "{self.dialect.id}". Look '
+                "at its display, and compare the dialect with its manual."
             )
         return value
 
@@ -240,7 +241,8 @@ class Conversation(Generic[D]):
         # where the baud rate is a mere number, as over a network, it may be less
         self.acted = max(asked, self.link.now - later * wire.character_time)
         if re.search(self.dialect.error_ok, answer) is None:
-            raise RefusedError(f"The instrument refused {line!r}: {answer}.")
+            what, port = self.link.what, self.link.port
+            raise RefusedError(failures.refused(what, port, line, answer))
 
     def offer(self, lines: Iterable[str]) -> None:
         """Send lines whose refusal is accepted."""

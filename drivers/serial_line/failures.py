@@ -37,12 +37,13 @@ def no_answer(what: str, port: str, asked: str, got: bytes, timeout: float) -> s
     )
 
 
-def silence(what: str, port: str, asked: str, name: str, seconds: float) -> str:
-    """Nothing came, to `asked` nor to the question for its `name`, for `seconds`."""
+def silence(what: str, port: str, asked: str, name: str, patience: float) -> str:
+    """Nothing came, to `asked` nor to the question for its `name`, for `patience` s."""
+    after = f"in the {patience:g} s after it" if patience else "after it"
     return (
-        f"The {what} at {port} answered nothing to {asked!r}, nor to {name!r} in the "
-        f"{seconds:.2g} s after it: it is switched off, hangs, or its line is cut. "
-        "Look at its front panel, check power and cable, and start again."
+        f"The {what} at {port} answered nothing to {asked!r}, nor to {name!r} {after}: "
+        "it is switched off, hangs, or its line is cut. Look at its front panel, check "
+        "power and cable."
     )
 
 
@@ -96,6 +97,23 @@ def lost(what: str, port: str, reason: Exception) -> str:
         why = os.strerror(number) if number else text
         then = "Check cable and power"
     return f"The link to the {what} at {port} was lost: {why}. {then}."
+
+
+def refused(what: str, port: str, line: str, answer: str) -> str:
+    """It reported an error of its own to a line."""
+    return (
+        f"The {what} at {port} refused {line!r}: {answer}. Look at its front panel; "
+        "its manual says what that error means."
+    )
+
+
+def gathered(trouble: Sequence[str]) -> str:
+    """What went wrong in several steps, `step: why` each: steps of one cause once."""
+    steps: dict[str, dict[str, None]] = {}
+    for one in trouble:
+        step, _, why = one.partition(": ")
+        steps.setdefault(why, {})[step] = None
+    return " | ".join(f"{', '.join(which)}: {why}" for why, which in steps.items())
 
 
 def _numbers(reason: Exception) -> list[int]:

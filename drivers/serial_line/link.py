@@ -274,11 +274,10 @@ class SerialLink:
             except NoReplyError as reason:
                 if self.half_sent:
                     raise
-                waited = self._clock.now() - begun
-                if waited >= patience:
+                if self._clock.now() - begun >= patience:
                     asked, name = self._asked, self._identify
                     raise NoReplyError(
-                        failures.silence(self.what, self.port, asked, name, waited)
+                        failures.silence(self.what, self.port, asked, name, patience)
                     ) from reason
 
     def _has_said_its_name(self) -> None:

@@ -67,4 +67,6 @@ def _result(verdict: Verification) -> str:
         return "as it was written, but samples are missing"
     if proof is not None and proof.surplus:
         return "as it was written, but samples are too many"
+    if proof is not None and proof.samples:
+        return "as it was written, but samples are lost"
     return "sound"

@@ -73,7 +73,7 @@ class RunFolder:
         lost = f"No run folder can be made under {root}"
         with failing_as(lost, "Choose a writable folder with --out."):
             root.mkdir(parents=True, exist_ok=True)
-            check_space(root, needed + RESERVE)
+            check_space(root, needed + RESERVE, "for the run and its reserve")
             path = _unique(root, f"{began:%Y-%m-%d_%H%M%S}_{_plain(name)}")
             content = {
                 "schema": SCHEMA,

@@ -304,7 +304,7 @@ class Recorder:
     def _flush(self) -> None:
         if self._file is None:
             return
-        check_space(self.folder.path, self._reserve)
+        check_space(self.folder.path, self._reserve, "while a run is written")
         if time.monotonic() - self._flushed > CADENCE:
             for column in self._columns:
                 column.write()

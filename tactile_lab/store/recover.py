@@ -99,7 +99,8 @@ def recover(path: Path, progress: Progress = nothing) -> Recovered:
         return _without_samples(path, info)
     if not written.rows.get("segments"):
         written.rows["segments"] = _told_by(killed).rows.get("segments", [])
-    check_space(path, killed.stat().st_size + RESERVE)
+    needed = killed.stat().st_size + RESERVE
+    check_space(path, needed, "for the copy and the reserve")
     new = path / "data.recovering.h5"
     with failing_as(f"{path} cannot be written", ELSEWHERE):
         try:

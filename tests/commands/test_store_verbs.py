@@ -20,8 +20,13 @@ BENCH = runpy.run_path(str(Path(__file__).parents[1] / "store" / "conftest.py"))
 
 @pytest.fixture
 def run(tmp_path):
+    return recorded(tmp_path / "runs")
+
+
+def recorded(root, produced=5000):
+    """A run that stored 5000 samples a channel, of as many as the scope `produced`."""
     folder = RunFolder.create(
-        tmp_path / "runs",
+        root,
         "pulses",
         {"protocol": "pulses", "simulated": True, "notes": {"sensor": "S12"}},
     )
@@ -30,7 +35,7 @@ def run(tmp_path):
     )
     recorder = Recorder(folder, layout, reserve=0)
     BENCH["play"](recorder, BENCH["codes"](5000), 500)
-    recorder.close("complete", 5000, duration_s=5.0)
+    recorder.close("complete", produced, duration_s=5.0)
     write_certificate(folder.path)
     return folder.path
 
@@ -78,6 +83,12 @@ def test_verify_tells_sound_from_damaged(run):
     damaged = tell("verify", run, "--json")
     assert damaged.exit_code == 1
     assert json.loads(damaged.stdout)["findings"][0]["where"].startswith("data.h5")
+
+
+def test_a_run_that_lost_samples_is_not_called_sound(tmp_path):
+    told = tell("verify", recorded(tmp_path, produced=6000)).output.splitlines()
+    assert told[0].startswith("loss: 2,000 of 12,000 samples")
+    assert told[-1] == "as it was written, but samples are lost"
 
 
 def test_recover_refuses_a_whole_run(run):

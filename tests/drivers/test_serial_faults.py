@@ -99,7 +99,7 @@ def test_an_answer_that_comes_too_late_faults_and_ends_safely(serial_bench):
     it.coil.energise()
     it.drive(0.5)
     it.end.faults.add(SerialFault(kind="late", amount=3.0))
-    nothing = r"answered nothing to 'CURR .*', nor to '\*IDN\?' in the 1.* s after it"
+    nothing = r"answered nothing to 'CURR .*', nor to '\*IDN\?' in the 1 s after it"
     with pytest.raises(NoReplyError, match=nothing):
         it.drive(0.7)
     assert it.coil.safe_off().verified
@@ -131,6 +131,8 @@ def test_a_lasting_fault_is_told_and_not_called_safe(serial_bench, kind):
     report = it.coil.safe_off()
     assert not report.verified
     assert "OUTPUT STATE UNKNOWN" in report.text
+    told = [one.partition(": ")[2] for one in report.text.split(" | ")]
+    assert len(set(told)) == len(told), "a cause is told once, with all its steps"
     assert it.clock.now() - begun < 10
     if kind not in ("deaf", "stuck"):  # the way out still worked
         assert not it.source.output_on and it.source.setpoint == 0.0
@@ -256,7 +258,7 @@ def test_an_error_of_the_instrument_is_passed_on(serial_bench):
     it.coil.open()
     it.coil.energise()
     it.end.faults.add(SerialFault(kind="refused", line="CURR [^M]"))
-    with pytest.raises(RefusedError, match="-222"):
+    with pytest.raises(RefusedError, match=r"coil source at sim://.* refused .*-222"):
         it.drive(0.7)
     assert it.coil.safe_off().verified
 

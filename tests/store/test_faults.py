@@ -103,7 +103,9 @@ def test_a_waiting_caller_is_woken_by_a_failure(bench, folder, layout):
 
 
 def test_no_room_is_refused_before_anything_is_made(tmp_path):
-    with pytest.raises(RecordingError, match="GB are needed"):
+    with pytest.raises(
+        RecordingError, match="GB are needed for the run and its reserve"
+    ):
         RunFolder.create(tmp_path, "big", {}, needed=10**18)
     assert list(tmp_path.iterdir()) == []
 
