@@ -7,13 +7,20 @@ What grows while a run goes on (samples, ledger, log) has a way of its own.
 from __future__ import annotations
 
 import csv
+import itertools
 import os
 import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from glob import escape
 from pathlib import Path
 
 from tactile_lab.errors import RecordingError, TactileLabError
+
+LONGEST = 40
+"""Characters of a file's name that its part repeats: a name has 255 bytes at most."""
+
+_NUMBERS = itertools.count()
 
 
 def check_space(path: Path, needed: int, what: str = "") -> None:
@@ -83,8 +90,13 @@ def replacing(path: Path, size: int = 0, *, lasting: bool = False) -> Iterator[P
         )
     path.parent.mkdir(parents=True, exist_ok=True)
     check_space(path.parent, size)
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
-    part.unlink(missing_ok=True)  # of one that was killed
+    # another program, or another part of this one, may write the same file
+    name, number = f".{path.stem[:LONGEST]}", next(_NUMBERS)
+    part = path.with_name(f"{name}.{os.getpid()}.{number}.part{path.suffix}")
+    for other in path.parent.glob(f"{escape(name)}.*.*.part{escape(path.suffix)}"):
+        if not _is_written(other):
+            with suppress(PermissionError):
+                other.unlink(missing_ok=True)
     try:
         yield part
         if lasting:
@@ -93,6 +105,22 @@ def replacing(path: Path, size: int = 0, *, lasting: bool = False) -> Iterator[P
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def _is_written(part: Path) -> bool:
+    """Whether the program that began a part is there still; it may have been killed."""
+    process = part.name.removesuffix(part.suffix).split(".")[-3]
+    if not process.isdecimal():
+        return True
+    if os.name == "nt":
+        return False  # a file that is open cannot be removed there
+    try:
+        os.kill(int(process), 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def write_text(path: Path, text: str, *, lasting: bool = False) -> None:

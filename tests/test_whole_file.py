@@ -1,6 +1,9 @@
 """Outputs are whole or as they were, on a disk that fills up while they are written."""
 
 import os
+import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -15,7 +18,7 @@ from tactile_lab.scene.load import load
 from tactile_lab.scene.write_bench import write_bench
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.validation.accuracy import COLUMNS, write_csv
-from tactile_lab.whole_file import write_text
+from tactile_lab.whole_file import replacing, write_text
 
 BENCH = Path("tactile_lab/scene/simulated_bench.toml").read_text(encoding="utf-8")
 
@@ -55,6 +58,38 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path, write) -> None:
         write(path)
     assert path.read_text() == "as it was"
     assert list(path.parent.iterdir()) == [path], "nothing else is left of it"
+
+
+def test_two_that_write_one_file_leave_it_whole(tmp_path: Path) -> None:
+    """The one that ended first put what the other had begun there, and said done."""
+    path = tmp_path / "run.mat"
+    with replacing(path) as first:
+        first.write_text("first, whole")
+        with replacing(path) as second:
+            second.write_text("sec")
+            with replacing(path) as third:
+                third.write_text("third, whole")
+            assert path.read_text() == "third, whole"
+            second.write_text("second, whole")
+        assert path.read_text() == "second, whole"
+    assert path.read_text() == "first, whole"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_a_killed_program_had_begun_is_taken_away(tmp_path: Path) -> None:
+    path = tmp_path / "run.mat"
+    begin = (
+        "import os, signal, pathlib\n"
+        "from tactile_lab.whole_file import replacing\n"
+        f"with replacing(pathlib.Path({str(path)!r})) as part:\n"
+        "    part.write_text('begun')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    killed = subprocess.run([sys.executable, "-c", begin], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    assert len(list(tmp_path.iterdir())) == 1
+    write_text(path, "whole")
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_what_is_written_is_there() -> None:

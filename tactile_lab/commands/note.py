@@ -53,7 +53,7 @@ def command(
         missing = [_word(one) for one in untag if _word(one) not in found.tags]
         if missing:
             raise SceneError(
-                f"{run.name} has no tag {missing[0]}; it has "
+                f"{run.resolve().name} has no tag {missing[0]}; it has "
                 f"{', '.join(found.tags) or 'none'}."
             )
         gone = {_word(one) for one in untag}
@@ -77,7 +77,14 @@ def command(
         )
         return
     mark = "* " if found.starred else ""
-    say(" ".join((f"{mark}{found.title or run.name}", *(f"#{t}" for t in found.tags))))
+    say(
+        " ".join(
+            (
+                f"{mark}{found.title or run.resolve().name}",
+                *(f"#{t}" for t in found.tags),
+            )
+        )
+    )
     for one in found.notes:
         say(f"  {one}")
 

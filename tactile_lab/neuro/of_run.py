@@ -35,7 +35,7 @@ def events_of(run: Run, selection: Selection | None = None) -> Events:
     told: dict[str, Any] = {
         key: value for key, value in about(run).items() if key != "scene.toml"
     }
-    told |= {"name": run.path.resolve().name, "signal": run.detection.signal}
+    told |= {"name": run.name, "signal": run.detection.signal}
     told.setdefault("title", str(told["name"]))
     told["trials"] = []
     if trials is not None:

@@ -97,7 +97,7 @@ class Run(StoredRun):
             known = SIGNALS[name]
             attrs = {"units": known.unit, "long_name": known.title}
             dataset[name] = ("time", values, attrs)
-        dataset.attrs.update(run=self.path.name, simulated=int(self.simulated))
+        dataset.attrs.update(run=self.name, simulated=int(self.simulated))
         return dataset
 
     def to_pandas(
@@ -183,7 +183,7 @@ class Run(StoredRun):
             for row in self.trials
         ]
         head = ("trial", "start", "end", "spikes")
-        return notebook.facts(self.path.name, rows) + notebook.table(head, trials)
+        return notebook.facts(self.name, rows) + notebook.table(head, trials)
 
 
 def _optional(name: str) -> Any:

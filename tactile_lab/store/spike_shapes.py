@@ -70,7 +70,7 @@ def spike_shapes(run: Run, times: FloatArray) -> SpikeShapes:
     """
     found, spikes = run.detection, run.spikes
     if found is None or not spikes.size:
-        raise RunFolderError(f"{run.path.name} has no spike that could be shown.")
+        raise RunFolderError(f"{run.name} has no spike that could be shown.")
     signal = run.signal(found.signal)
     ends = np.concatenate(([-np.inf], spikes["time"], [np.inf]))
     right = np.searchsorted(spikes["time"], times)

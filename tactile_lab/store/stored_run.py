@@ -96,6 +96,11 @@ class StoredRun:
             ) from error
         return cls(path, info, opened)
 
+    @property
+    def name(self) -> str:
+        """Of its folder, also where that was given as `.`."""
+        return self.path.resolve().name
+
     def close(self) -> None:
         """Let go of the file."""
         self._file.close()
@@ -441,11 +446,11 @@ class StoredRun:
 
     def __repr__(self) -> str:
         if not self._file:
-            return f"<Run {self.path.name}: closed>"
+            return f"<Run {self.name}: closed>"
         kind = "simulated" if self.simulated else "measured"
         trials, spikes = len(self.trials), len(self.table("spikes"))
         return (
-            f"<Run of {self.info.get('scene') or self.path.name}: {self.status}, "
+            f"<Run of {self.info.get('scene') or self.name}: {self.status}, "
             f"{kind}, {show(self.duration, 's')}, {count(trials, 'trial')}, "
             f"{count(spikes, 'spike')}; {', '.join(self.signals) or 'no samples'}>"
         )

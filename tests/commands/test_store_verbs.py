@@ -13,6 +13,7 @@ from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
+from tactile_lab.store.run import Run
 from tactile_lab.store.verify import verify
 
 BENCH = runpy.run_path(str(Path(__file__).parents[1] / "store" / "conftest.py"))
@@ -89,6 +90,14 @@ def test_a_run_that_lost_samples_is_not_called_sound(tmp_path):
     told = tell("verify", recorded(tmp_path, produced=6000)).output.splitlines()
     assert told[0].startswith("loss: 2,000 of 12,000 samples")
     assert told[-1] == "as it was written, but samples are lost"
+
+
+def test_a_run_has_its_name_where_it_is_given_as_a_dot(run, monkeypatch):
+    monkeypatch.chdir(run)
+    assert tell("note", ".", "--tag", "cal").output.splitlines() == [f"{run.name} #cal"]
+    with Run.load(".") as stored:
+        assert stored.to_xarray(1.0, 2.0).attrs["run"] == run.name
+    assert repr(stored) == f"<Run {run.name}: closed>"
 
 
 def test_recover_refuses_a_whole_run(run):

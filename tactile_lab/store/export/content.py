@@ -105,7 +105,7 @@ def _plain(values: NDArray[Any]) -> NDArray[Any]:
 def about(run: Run, names: tuple[str, ...] = ()) -> dict[str, str | float]:
     """What the run is, by name; of the signals in `names` how they were measured."""
     info = run.info
-    told: dict[str, str | float] = {"run": run.path.resolve().name}
+    told: dict[str, str | float] = {"run": run.name}
     for key in ("title", "protocol", "scene", "bench", "started", "reason"):
         if info.get(key):
             told[key] = str(info[key])

@@ -95,8 +95,8 @@ def _session(pynwb: Any, run: Run, told: dict[str, str | float]) -> Any:
     scene = told.pop("scene.toml", None)
     session = pynwb.NWBFile(
         session_description=f"{title} on a spiking tactile sensor, {kind}",
-        identifier=run.path.resolve().name,
-        session_id=run.path.resolve().name,
+        identifier=run.name,
+        session_id=run.name,
         session_start_time=datetime.fromisoformat(run.info["started"]),
         experimenter=[_last_first(notes["operator"])]
         if notes.get("operator")

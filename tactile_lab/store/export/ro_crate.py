@@ -124,7 +124,7 @@ def crate(run: Run) -> dict[str, Any]:
     dataset: Entity = {
         "@id": "./",
         "@type": "Dataset",
-        "name": f"{title}: {run.path.resolve().name}",
+        "name": f"{title}: {run.name}",
         "description": f"{title} on a spiking piezoelectric tactile sensor, {kind} "
         f"({info.get('bench')}), {run.status}; {run.duration:.4g} s, {spikes}",
         "datePublished": info.get("started"),
