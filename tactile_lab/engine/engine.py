@@ -100,7 +100,8 @@ class Engine:
         self._sending = threading.Lock()
         self.tasks: dict[int, ServedTask] = {}
         self.instruments = threading.Lock()
-        self._said: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+        self._said: SimpleQueue[tuple[ServedTask, Callable[[], None]] | None]
+        self._said = SimpleQueue()
         self._questions = threading.BoundedSemaphore(MOST_QUESTIONS)
 
     def serve(self) -> None:
@@ -154,7 +155,8 @@ class Engine:
     def say(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
         """Have `act(served, ...)` done to a task; one that has ended hears nothing."""
         if number in self.tasks:
-            self._said.put(partial(act, self.tasks[number], *arguments, **named))
+            task = self.tasks[number]
+            self._said.put((task, partial(act, task, *arguments, **named)))
 
     def stop(self, number: int, reason: str) -> None:
         """Switch off and end a task, now."""
@@ -164,10 +166,16 @@ class Engine:
     def _do_said(self) -> None:
         """Do what is said in its order, in a thread of its own: a note may take long.
 
-        Its disk may be slow, and a STOP behind it would wait as long.
+        Its disk may be slow, and a STOP behind it would wait as long. A task that did
+        not do what it was told does not go on.
         """
-        while (act := self._said.get()) is not None:
-            act()
+        while (said := self._said.get()) is not None:
+            task, act = said
+            try:
+                act()
+            except Exception as error:
+                what = f"{type(error).__name__}: {error}"
+                task.stop(f"What was asked of it meanwhile broke. {what}")
 
     def ask(self, number: int, act: Act, *arguments: Any, **named: Any) -> None:
         """Have `act(engine, ...)` worked out beside everything else, and reply."""

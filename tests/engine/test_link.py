@@ -17,7 +17,13 @@ from engine_answers import answered, pid_of, size_of
 from tactile_lab.acquisition.events import RunState, SpikesSeen
 from tactile_lab.engine import engine as module
 from tactile_lab.engine.commands import begin_monitor, begin_run, note
-from tactile_lab.engine.engine import MOST_QUESTIONS, MOST_TASKS, Engine, Reply
+from tactile_lab.engine.engine import (
+    MOST_QUESTIONS,
+    MOST_TASKS,
+    Engine,
+    Reply,
+    ServedTask,
+)
 from tactile_lab.engine.events import Begun, Ended, Samples
 from tactile_lab.engine.jobs import check_bench
 from tactile_lab.engine.link import Link
@@ -86,6 +92,25 @@ def test_a_stop_waits_for_no_note_that_the_disk_does_not_take(tmp_path):
         *_, told = run
         remarks.write_text("{}")
     assert told.ending.state is RunState.ABORTED and told.ending.off.verified
+
+
+def breaks_when_told(served: ServedTask) -> None:
+    """Something of somebody's own to do to a run, with a mistake in it."""
+    raise KeyError("nothing")
+
+
+def test_a_run_does_not_go_on_that_did_not_do_what_it_was_told(tmp_path):
+    longer = ('protocol.levels=["80 mN"]', "protocol.hold=3 s")
+    with Link(separate=False) as link:
+        run = link.follow(begin_run, Request("demo", longer), tmp_path, {})
+        next(iter(run))
+        run.say(breaks_when_told)
+        run.say(note, "is heard all the same", None)
+        *_, told = run
+    ending = told.ending
+    assert ending.state is RunState.ABORTED and ending.off.verified
+    assert ending.reason.endswith("broke. KeyError: 'nothing'")
+    assert "is heard" in (next(tmp_path.iterdir()) / "remarks.json").read_text()
 
 
 def test_a_refused_task_only_ends_and_says_why(tmp_path):
