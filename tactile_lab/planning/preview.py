@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from tactile_lab.errors import SceneError
 from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import BENCH_ONLY
 from tactile_lab.waveform import Waveform
+
+if TYPE_CHECKING:
+    from tactile_lab.model.solution import Solution
 
 DEFAULT_TOLERANCE = 1e-9
 
@@ -39,12 +43,7 @@ def model(
         ParameterError: the tolerance cannot be asked for.
         SolverError: the model cannot answer to that tolerance.
     """
-    if scene.protocol.sets:
-        raise SceneError(
-            f"protocol {scene.protocol.name} sets {', '.join(scene.protocol.sets)} "
-            "from trial to trial; the model alone has one for all. `tactile-lab run` "
-            "plays it on the simulated bench."
-        )
+    _only_one(scene)
     return simulate(
         scene.circuit,
         force,
@@ -53,3 +52,30 @@ def model(
         start=scene.start,
         tolerance=tolerance,
     )
+
+
+def in_slices(
+    scene: Scene, force: Waveform, duration: float, keep: Sequence[str]
+) -> Iterator[Solution]:
+    """As `model`, slice by slice, none of which is held.
+
+    Raises:
+        SceneError: its protocol sets voltages from trial to trial.
+        SolverError: the model cannot answer to the tolerance.
+    """
+    from tactile_lab.model.slices import slices
+
+    _only_one(scene)
+    return slices(
+        scene.circuit, force, keep=tuple(keep), until=duration, start=scene.start,
+        tolerance=DEFAULT_TOLERANCE,
+    )  # fmt: skip
+
+
+def _only_one(scene: Scene) -> None:
+    if scene.protocol.sets:
+        raise SceneError(
+            f"protocol {scene.protocol.name} sets {', '.join(scene.protocol.sets)} "
+            "from trial to trial; the model alone has one for all. `tactile-lab run` "
+            "plays it on the simulated bench."
+        )

@@ -42,15 +42,19 @@ def expected(scene: Scene, channels: Sequence[Channel], drive: Timeline) -> Extr
     ]
     if not names or scene.protocol.moves_probes or scene.protocol.sets:
         return {}
-    from tactile_lab.planning.preview import model
+    from tactile_lab.model.slices import Samples
+    from tactile_lab.planning.preview import in_slices
 
+    until = drive.duration
+    looked = [Samples(name, np.linspace(0.0, until, GRID), until) for name in names]
     try:
-        found = model(scene, drive.force, drive.duration, names)
+        for part in in_slices(scene, drive.force, until, names):
+            for samples in looked:
+                samples.take(part)
     except SolverError:
         return {}
-    times = np.linspace(0.0, found.duration, GRID)
-    seen = {name: found.sample(name, times) for name in names}
-    told = {name: (float(v.min()), float(v.max())) for name, v in seen.items()}
+    seen = zip(names, (samples.value for samples in looked), strict=True)
+    told = {name: (float(v.min()), float(v.max())) for name, v in seen}
     if "V_C2" in told:
         low, high = told["V_C2"]
         told["V_C2"] = min(low, 0.0), max(high, scene.circuit.fire_voltage)

@@ -1,12 +1,10 @@
-import re
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from peak_memory import peak, tells_peak
 
 from tactile_lab.analysis.belief import PART
 from tactile_lab.analysis.evidence import Residuals
@@ -31,18 +29,6 @@ def measured(circuit, signal="V_C1", noise=0.0, bins=500):
     return Measured(signal, time, value), found.spike_times
 
 
-def peak(doing):
-    """Memory that it takes at most beyond what there was, MB; and its answer."""
-
-    def told():
-        text = Path("/proc/self/status").read_text()
-        return int(re.search(r"VmHWM:\s+(\d+)", text)[1]) / 1024
-
-    Path("/proc/self/clear_refs").write_text("5")
-    before, found = told(), doing()
-    return told() - before, found
-
-
 LONG = np.linspace(0, 30, 150_000)
 SWINGING = Waveform(LONG, 0.1 + 0.05 * np.sin(2 * np.pi * LONG))
 BINS = (np.arange(4000) + 0.5) * SWINGING.end / 4000
@@ -61,7 +47,7 @@ def residuals():
     return np.append(problem.under(driven), problem.late(driven))
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="Linux tells a process its peak")
+@tells_peak
 @pytest.mark.parametrize("compared", [beside, residuals])
 def test_a_long_force_is_compared_in_the_memory_of_a_slice(compared, monkeypatch):
     """Ten minutes of `repeat` are 380,000 points, of which all took 470 MB at once."""

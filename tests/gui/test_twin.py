@@ -94,7 +94,7 @@ def test_bins_hold_all_the_model_does(start, width, count, signal) -> None:
     spikes = RESULT.spike_times
     assert spikes is not None and spikes.size > 5
     inside = spikes[(spikes >= start) & (spikes < end)]
-    bins = binned(RESULT, signal, inside, start, end, count)
+    bins = binned([RESULT.solution], [signal], start, end, count)[signal]
     assert np.all(bins.low <= bins.mean) and np.all(bins.mean <= bins.high)
     peak = {"V_C1": 0.0, "V_C2": 3.0, "V_K": 3.0}[signal]
     for spike in inside:
@@ -109,7 +109,7 @@ def parts(
 
     def slice_(start: float, end: float, count: int) -> ModelPart:
         spikes = np.empty(0)
-        bins = {"V_C1": binned(RESULT, "V_C1", spikes, start, end, count)}
+        bins = binned([RESULT.solution], ["V_C1"], start, end, count)
         return ModelPart(bins, spikes, end)
 
     twin = TwinTraces(lambda *part: asked.append(part))

@@ -4,11 +4,13 @@ import json
 from importlib import resources
 
 import pytest
+from peak_memory import peak, tells_peak
 
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.planning.computing import slowness
 from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan, text
+from tactile_lab.planning.ranges import expected
 from tactile_lab.scene.load import load
 
 
@@ -381,3 +383,19 @@ def test_a_rate_that_node_a_does_not_need_is_told():
     assert 'record.sample_rate = "10 kS/s"' in told
     assert plan(load("v_c1_only")).suggestions == ()
     assert not any("kS/s" in line for line in plan(load(None)).suggestions)
+
+
+@tells_peak
+def test_ranges_are_chosen_in_the_memory_of_a_slice(monkeypatch):
+    """The run of an hour of `repeat` began with 230 MB for that alone."""
+    scene = load("repeat", {"protocol.count": 150})
+    planned = plan(scene, preview=False)
+    channels = planned.needs.channels
+    taken, found = [], []
+    for points in (500, 500, 10**6):  # what is taken for the first time stays
+        monkeypatch.setattr("tactile_lab.model.slices.POINTS", points)
+        most, told = peak(lambda: expected(scene, channels, planned.timeline))
+        taken.append(most)
+        found.append(told)
+    assert found[0] == found[1] == found[2]
+    assert taken[1] < 0.3 * taken[2]

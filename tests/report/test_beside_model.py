@@ -1,12 +1,16 @@
 """The model beside a run of the simulated bench knows the bench, or says what not."""
 
+import gc
 import json
 from dataclasses import replace
+from weakref import ref
 
 import numpy as np
 import pytest
 
 from tactile_lab.engine.execution import Execution
+from tactile_lab.engine.model_parts import SOLVED, StoredParts
+from tactile_lab.model.advance import advance
 from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
 from tactile_lab.report.identified import identify_run
@@ -24,12 +28,17 @@ SHORT = {
 
 def ran(folder, **deviation):
     scene = load("surprise", {**SHORT, "simulated.deviation": deviation})
-    return read(Execution(scene, folder).run().folder)
+    return Execution(scene, folder).run().folder
 
 
 @pytest.fixture(scope="module")
-def as_believed(tmp_path_factory):
+def folder(tmp_path_factory):
     return ran(tmp_path_factory.mktemp("believed"))
+
+
+@pytest.fixture(scope="module")
+def as_believed(folder):
+    return read(folder)
 
 
 def test_out_of_the_box_the_model_knows_its_bench(as_believed):
@@ -101,7 +110,7 @@ def test_the_error_budget_tells_what_is_stated_and_what_is_not(as_believed):
 
 
 def test_a_surprise_is_found_out_by_the_report(tmp_path):
-    findings = find(ran(tmp_path, input_bias=60e-12))
+    findings = find(read(ran(tmp_path, input_bias=60e-12)))
     found = findings.beside
     (said,) = (s for s in sentences(found, findings.run) if "It misses" in s)
     assert "all data taken together, though each may lie within its own" in said
@@ -120,3 +129,30 @@ def test_spikes_that_a_slow_sampling_misses_are_laid_on_no_cause(tmp_path):
     assert found.explanation is None
     V_GS = identify_run(run, ["V_GS"]).estimates["V_GS"]
     assert V_GS.low < run.circuit.V_GS < V_GS.high
+
+
+def test_the_window_s_model_is_that_of_slices_of_which_few_are_held(
+    folder, monkeypatch
+):
+    """Of ten minutes of `repeat` it held 200 MB while the run was on screen."""
+    at_once = StoredParts(folder)
+    monkeypatch.setattr("tactile_lab.model.slices.POINTS", 100)
+    kept = []
+    monkeypatch.setattr(
+        "tactile_lab.model.advance.advance",
+        lambda *a, **k: kept.append(ref(made := advance(*a, **k))) or made,
+    )
+    in_slices, looks = StoredParts(folder), [(0.0, np.inf, None)]
+    for start in np.linspace(0.05, 3.0, 15):
+        looks += [(start, start + 0.3, 500), (start, start + 1e-3, 50)]
+    for look in looks:
+        one, other = at_once.part(*look), in_slices.part(*look)
+        assert np.array_equal(one.spikes, other.spikes)
+        assert one.bins.keys() == other.bins.keys() == {"V_C1", "V_C2", "V_K"}
+        for name, bins in one.bins.items():
+            for value in ("time", "low", "mean", "high"):
+                mine, theirs = getattr(bins, value), getattr(other.bins[name], value)
+                assert mine == pytest.approx(theirs, abs=1e-12), (name, value, look)
+    gc.collect()
+    assert len(kept) > 20
+    assert sum(one() is not None for one in kept) <= 2 * SOLVED
