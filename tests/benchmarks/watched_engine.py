@@ -60,7 +60,7 @@ class Witness:
             time.sleep(LOOK)
 
     def _follow(self, far: wires.FarEnd) -> None:
-        self._newest, self._fault = number(far), ""
+        self._newest = number(far)
         source = far.instrument
         assert isinstance(source, SimCoilSource)
         source.on_change = partial(self._changed, far.name)
@@ -78,6 +78,7 @@ class Witness:
                 told.write(f"{line}\n")
 
     def _fail(self, far: wires.FarEnd) -> None:
+        """One that comes after it does not fail by the same word."""
         wanted = FAULT.read_text() if FAULT.exists() else ""
         if wanted == self._fault:
             return
