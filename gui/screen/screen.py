@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ from gui.screen.records import Records
 from gui.session.log import Severity
 from gui.session.session import BY_HAND
 from gui.state import WindowState
-from tactile_lab.engine.memory import give_back
+from tactile_lab.engine.memory import trim
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import RunFolderError, TactileLabError
 from tactile_lab.quantity import looked_for, show
@@ -266,7 +267,9 @@ class Screen(QObject):
             self._ended = done.folder
             self._records.exchange(done.folder)
         QTimer.singleShot(LATER, self.list_runs)
-        QTimer.singleShot(LATER, give_back)
+        QTimer.singleShot(LATER, gc.collect)
+        # by then the next run may go on, whose STOP would wait for it
+        QTimer.singleShot(LATER, lambda: start(trim, "give back"))
 
     def run_cut(self, word: str) -> None:
         """The engine died or the run broke: its record may have to be recovered."""

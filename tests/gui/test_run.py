@@ -22,6 +22,7 @@ from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.bench import OffReport
+from tactile_lab.engine import memory
 from tactile_lab.waveform import Waveform
 
 FORCE = """
@@ -155,6 +156,22 @@ def test_stop_ends_the_run_with_the_coil_off(lab, how: str) -> None:
     coil = session.coil_view()
     assert coil is not None and coil.output is False and coil.verified_off
     assert window.screen_.ending.startswith("Aborted")
+
+
+def test_what_a_run_has_freed_is_given_back_beside_the_window_thread(
+    lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It takes some 40 ms of it, in which the next run may have begun."""
+    where: list[threading.Thread] = []
+    monkeypatch.setattr(
+        memory, "forget_code", lambda: where.append(threading.current_thread())
+    )
+    lab.run()
+    lab.session.stop()
+    lab.until(lambda: not lab.session.busy)
+    where.clear()  # of the engine, which is a thread here
+    lab.until(lambda: where)
+    assert threading.main_thread() not in where
 
 
 def test_stop_is_enabled_in_every_state(lab) -> None:
