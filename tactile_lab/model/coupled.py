@@ -57,6 +57,7 @@ from tactile_lab.model.kernel import (
     stored,
     wave_room,
 )
+from tactile_lab.model.magnus import rested
 from tactile_lab.model.need import DENSE, DENSE_V_C2, SPIKES
 from tactile_lab.model.node_a import (
     DIVIDER,
@@ -74,10 +75,13 @@ from tactile_lab.model.pair import (
     LEFT_2,
     LENGTH,
     MOVED,
+    REACH,
     STAYS_1,
     STAYS_2,
     STEP,
-    UNITS,
+    STIFF,
+    STRETCH,
+    TURN,
     V_END,
     Y_END,
     collocated,
@@ -102,6 +106,7 @@ from tactile_lab.model.spiking import (
     fire,
     grown,
 )
+from tactile_lab.model.stretched_time import pace_at
 from tactile_lab.model.tableau import ORDER
 from tactile_lab.model.taylor import (
     MOST,
@@ -111,9 +116,8 @@ from tactile_lab.model.taylor import (
     expanded,
     fastest,
     highest,
-    longest,
+    in_time,
     move,
-    rested,
     to_chebyshev,
 )
 from tactile_lab.model.taylor import V as OF_V_C2
@@ -139,17 +143,15 @@ taylor_room = room_for(ROWS, MOST + 2)
 
 @inner
 def restart(
-    B: float, y: float, par: FloatArray, E: FloatArray, S: FloatArray,
-    f: FloatArray, g: FloatArray,
-) -> float:  # fmt: skip
-    """End the reset: V_C2 = V_reset; an error in its time becomes one of voltages.
+    B: float, y: float, par: FloatArray, E: FloatArray, S: FloatArray, f: FloatArray
+) -> float:
+    """End the reset: V_C2 = V_reset; an error in its time becomes one of V_C2.
 
-    Leaves `flow` after it in f.
+    V_C1 goes on as before. Leaves `flow` after it in f.
     """
     v: float = par[V_RESET]
-    flow(B, y, v, True, par, g)
     flow(B, y, v, False, par, f)
-    transform(E, 1.0, g[TO_A] - f[TO_A], 0.0, -f[TO_C2])
+    transform(E, 1.0, 0.0, 0.0, -f[TO_C2])
     S[RESUME] = -1.0
     return v
 
@@ -207,7 +209,7 @@ def _build(stamp: int) -> Callable[..., Any]:
             high = max(y, par[V_S], v, par[V_RESET]) + par[V_T]
             s = carry = 0.0
             if S[RESUME] == 0.0:
-                v = restart(B0, y, par, E, S, f, g)
+                v = restart(B0, y, par, E, S, f)
             held = S[RESUME] >= 0.0
             if held:
                 v = par[V_FIRE]
@@ -231,7 +233,6 @@ def _build(stamp: int) -> Callable[..., Any]:
                     flow(B_at(V_P_at(s, V0, p, par[TAU]), par), y, v, held, par, f)
                 known = True
                 rate = fastest(f)
-                unit = 1.0 / rate
                 degree = 0
                 stiff = stiff or short >= PATIENCE
                 if not stiff:
@@ -241,9 +242,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     )  # fmt: skip
                     S[ITERATIONS] += 1.0
                     h = step[LENGTH]
-                    short = (
-                        short + 1 if degree and step[UNITS] == longest(degree) else 0
-                    )
+                    short = short + 1 if degree and step[STIFF] != 0.0 else 0
                 if at_rest:
                     h = room
                     rested(h, y, v, f, a, b, step)
@@ -275,10 +274,11 @@ def _build(stamp: int) -> Callable[..., Any]:
                 floor_1 = 5e-16 * (max(abs(y), abs(step[Y_END])) + 12.0 * depth)
                 floor_2 = 1e-15 * (max(abs(v), abs(step[V_END])) + abs(par[V_FIRE]))
                 inside = step[LEFT_2] + floor_2 + math.sqrt(E[E_22])
-                x, whole, u = step[UNITS], h, 2.0
+                x, whole, u = step[REACH], h, 2.0
                 if not held and (
                     degree == 0
-                    or highest(c[OF_V_C2], degree, x) > par[V_FIRE] - 2.0 * inside
+                    or highest(c[OF_V_C2], degree, x, step[V_END])
+                    > par[V_FIRE] - 2.0 * inside
                 ):
                     S[SEARCHES] += 1.0
                     if degree:
@@ -287,16 +287,16 @@ def _build(stamp: int) -> Callable[..., Any]:
                     if doubt:
                         S[DOUBT] = 1.0
                 if u < 1.0:
-                    h *= u
-                    x *= u
                     step[STAYS_1] = max(step[STAYS_1], step[LEFT_1])
                     step[STAYS_2] = max(step[STAYS_2], step[LEFT_2])
                     if degree:
-                        end_at(s, x, unit, held, V0, p, degree, par, c, g, step)
+                        end_at(u * x, held, degree, par, c, g, step)
+                        h = step[LENGTH]
                     else:
                         end_inside(u, y, v, W, right, step)
+                        h *= u
                 if degree:
-                    move(x, unit, held, degree, par, c, f, m, g, step)
+                    move(held, degree, par, c, f, m, g, step)
                 S[STEPS] += 1.0
                 S[EXPANSIONS] += 1.0
                 S[Y_LARGEST_ERROR] = max(
@@ -313,35 +313,45 @@ def _build(stamp: int) -> Callable[..., Any]:
                     stays_2 = step[STAYS_2] + floor_2
                     stays_2 += abs(step[MOVED + 2]) * max(0.05 * step[LEFT_1], stays_1)
                 widen(E, stays_1, stays_2)
-                if keep_1:
-                    n = int(S[ROWS_1])
-                    step_rows = more_rows(step_rows, n)
-                    step_rows[n, 0], step_rows[n, 1], step_rows[n, 2] = t, s, h
-                    if degree:
-                        to_chebyshev(c[OF_V_C1], degree, x, part, d)
-                    else:
-                        shortened(a, min(u, 1.0), part, d)
-                    for i in range(ORDER + 1):
-                        step_rows[n, 3 + i] = d[i]
-                    S[ROWS_1] += 1.0
+                # a power series reaches farther than one of Chebyshev's: two of these
                 S[PIECES] += 1.0
-                if keep_2:
-                    n = int(S[ROWS_2])
-                    piece_rows = more_rows(piece_rows, n)
-                    piece_rows[n, 0], piece_rows[n, 1], piece_rows[n, 2] = t, s, h
-                    piece_rows[n, 3] = ORDER
-                    if degree:
-                        to_chebyshev(c[OF_V_C2], degree, x, part, d)
-                    else:
-                        shortened(b, min(u, 1.0), part, d)
-                    # the series is all: nothing is left for the exponential
-                    piece_rows[n, 4] = d[0] + series_at(d, ORDER, -1.0)
-                    piece_rows[n, 5] = 2.0 * h if held else -1.0
-                    for i in range(ORDER + 1):
-                        piece_rows[n, 6 + i] = d[i]
-                    for i in range(ORDER + 1, MOST_TERMS + 1):
-                        piece_rows[n, 6 + i] = 0.0
-                    S[ROWS_2] += 1.0
+                halves = 2 if degree else 1
+                for half in range(halves):
+                    begins, length = 0.0, h
+                    if keep_1:
+                        if degree:
+                            begins, length = in_time(
+                                c[OF_V_C1], degree, half, step, part, d
+                            )
+                        else:
+                            shortened(a, min(u, 1.0), part, d)
+                        n = int(S[ROWS_1])
+                        step_rows = more_rows(step_rows, n)
+                        step_rows[n, 0], step_rows[n, 1] = t, s + begins
+                        step_rows[n, 2] = length
+                        for i in range(ORDER + 1):
+                            step_rows[n, 3 + i] = d[i]
+                        S[ROWS_1] += 1.0
+                    if keep_2:
+                        if degree:
+                            begins, length = in_time(
+                                c[OF_V_C2], degree, half, step, part, d
+                            )
+                        else:
+                            shortened(b, min(u, 1.0), part, d)
+                        n = int(S[ROWS_2])
+                        piece_rows = more_rows(piece_rows, n)
+                        piece_rows[n, 0], piece_rows[n, 1] = t, s + begins
+                        piece_rows[n, 2] = length
+                        piece_rows[n, 3] = ORDER
+                        # the series is all: nothing is left for the exponential
+                        piece_rows[n, 4] = d[0] + series_at(d, ORDER, -1.0)
+                        piece_rows[n, 5] = 2.0 * h if held else -1.0
+                        for i in range(ORDER + 1):
+                            piece_rows[n, 6 + i] = d[i]
+                        for i in range(ORDER + 1, MOST_TERMS + 1):
+                            piece_rows[n, 6 + i] = 0.0
+                        S[ROWS_2] += 1.0
                 y, v = step[Y_END], step[V_END]
                 h_next = h * step[GROWTH]
                 if not (abs(y) < np.inf and abs(v) < np.inf):
@@ -368,6 +378,8 @@ def _build(stamp: int) -> Callable[..., Any]:
                     slope = max(f[TO_C2], inside / h)
                     late = (par[V_FIRE] - v) / slope
                     error = math.sqrt(E[E_22]) / slope + EPS * (t + s)
+                    if degree:
+                        whole = x * pace_at(u * x, step[STRETCH], step[TURN])
                     # does the series stay above V_fire by more than its error?
                     x = 2.0 * u - 1.0 + 2.0 * min(max(2.0 * error / whole, 1e-7), 0.02)
                     beyond = b[0] + series_at(b, ORDER, x) - par[V_FIRE]
@@ -400,9 +412,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     s = T
                 h = h_next
                 if S[RESUME] == 0.0:
-                    v = restart(
-                        B_at(V_P_at(s, V0, p, par[TAU]), par), y, par, E, S, f, g
-                    )
+                    v = restart(B_at(V_P_at(s, V0, p, par[TAU]), par), y, par, E, S, f)
                     known, short, stiff = True, 0, False
             S[Y], S[VOLTAGE] = y, v
             if status != DONE:

@@ -33,16 +33,20 @@ from tactile_lab.model.transistor import (
 from tactile_lab.model.truncation import carried, longer, missing, unseen
 
 MOST_ITERATIONS = 10
+CLOSED = -50.0
+"""Exponent below which an exponential is nothing beside 1."""
 COLUMNS = 3
 """Right-hand sides: the correction, and the effect of either voltage at the start."""
-LENGTH, UNITS, Y_END, V_END, LEFT_1, LEFT_2, STAYS_1, STAYS_2, GROWTH, TERMS = range(10)
-"""A step: its length, s, and in units of the fastest rate; both voltages at its end, V;
-what they are wrong by within it and at its end, V; how much longer the next may be;
-of how many terms B's series is, where it is a power series."""
-MOVED = 10
+LENGTH, Y_END, V_END, LEFT_1, LEFT_2, STAYS_1, STAYS_2, GROWTH = range(8)
+"""A step: its length, s; both voltages at its end, V; what they are wrong by within it
+and at its end, V; how much longer the next may be."""
+STRETCH, TURN, REACH, STIFF, TERMS = range(8, 13)
+"""Where it is a power series: L and c of `stretched_time`, w at its end, whether it
+would not be stable farther, and the degree to which B is known in time."""
+MOVED = 13
 """From here on, what a volt at the start moves at the end: V_C1 by V_C1, by V_C2, V_C2
 by V_C1, by V_C2."""
-STEP = 14
+STEP = 17
 """Numbers of a step."""
 series_room = room_for(ORDER + 1)
 
@@ -82,7 +86,9 @@ def flow_near(
     """`flow`, where T1's omega is `near` a value that is known."""
     currents(y, par[V_RESET] if held else v, near, par, f)
     x = -y / par[V_T]
-    if x < -1.0:
+    if x < CLOSED:
+        q, Q = 0.0, -1.0
+    elif x < -1.0:
         q = math.exp(x)
         Q = q - 1.0
     else:
@@ -264,7 +270,7 @@ def collocated(
     step[LENGTH] = h * min(max(0.1, growth), 0.5)
     if max(left_1 + layer_1, left_2 + layer_2) > 3.0 * wanted + unsolved:
         return -1
-    step[LENGTH], step[GROWTH], step[UNITS] = h, min(max(growth, 0.2), 30.0), 1e300
+    step[LENGTH], step[GROWTH] = h, min(max(growth, 0.2), 30.0)
     step[LEFT_1], step[LEFT_2] = left_1 + layer_1, left_2 + layer_2
     step[STAYS_1] = carried(a, left_1) + layer_1
     step[STAYS_2] = carried(b, left_2) + layer_2

@@ -1,11 +1,11 @@
-"""V_C1 and V_C2 where T1 saturates, as power series in time: for steps not stiff.
+"""V_C1 and V_C2 where T1 saturates, as power series: for steps not stiff.
 
 All coefficients follow from the state by recursion, as every function in the equations
-solves a differential equation itself: x = exp(g) has x' = x g', and Wright's omega w of
-z has w' = w g' with g' = z' - w', for w + ln w = z. Time is counted in units of the
-fastest rate, so that no coefficient leaves the range of numbers. What either voltage at
-the start moves needs no such digits: it is Magnus's exponential of the Jacobian, of
-order 4.
+solves a differential equation itself: x = exp(g) has x' = x g', and Wright's omega W of
+z has W' = W g' with g' = z' - W', for W + ln W = z. They hold in any variable; the
+series are in w, in which no pole is near (see `stretched_time`), and what the equations
+say of a derivative by time is stretched as time is. What either voltage at the start
+moves needs no such digits (see `magnus`).
 """
 
 from __future__ import annotations
@@ -17,22 +17,26 @@ import numpy as np
 from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import DIRECT, TAU_L, to_series
+from tactile_lab.model.magnus import moved
 from tactile_lab.model.node_a import DIVIDER, LAMBDA, PER_VOLT, TAU, V_T, B_at, V_P_at
 from tactile_lab.model.pair import (
     GROWTH,
     LEFT_1,
     LEFT_2,
     LENGTH,
-    MOVED,
+    REACH,
     STAYS_1,
     STAYS_2,
+    STIFF,
+    STRETCH,
     TERMS,
-    UNITS,
+    TURN,
     V_END,
     Y_END,
     flow_near,
     with_node_a,
 )
+from tactile_lab.model.stretched_time import pace_at, stretch, time_at, w_at
 from tactile_lab.model.tableau import ORDER, POINTS
 from tactile_lab.model.transistor import (
     A_BY_1,
@@ -54,17 +58,25 @@ from tactile_lab.model.transistor import (
     of_junctions,
 )
 
-LEAST, MOST = 10, 30
+LEAST, MOST = 10, 36
 """Lowest and highest degree of a series."""
 PER = 1.0 / np.arange(1.0, MOST + 1.0)
-SAFETY = 2.0
-Y, V, TO_Y, TO_V, G, B, Q, P, APART, W, LOG = range(11)
-"""Rows: V_C1 and V_C2, V; their slopes, V per unit; slope of V_P; B;
-exp(-V_C1/V_T) - 1; 1 + J/I_T1s and the slope of its logarithm, (V_C2 - V_C1)/V_T;
-omega or, with "direct", I_F + I_T1s, and the slope of its logarithm."""
-ROWS = 11
-ROUNDING = 1e-17
-"""A term below this share of the first is nothing."""
+SAFETY, AIM = 2.0, 0.3
+"""By how much the error told is larger than found, and the part of what is wanted that
+steps are made for, as they reach all of it."""
+Y, V, TO_Y, TO_V, G, B, Q, P, APART, W, LOG, FADES, IN_TIME = range(13)
+"""Rows: V_C1 and V_C2, V; their slopes by w; that of V_P; B; exp(-V_C1/V_T) - 1;
+1 + J/I_T1s and the slope of its logarithm, (V_C2 - V_C1)/V_T; omega or, with "direct",
+I_F + I_T1s, and the slope of its logarithm; exp(-rate t); B in time."""
+ROWS = 13
+FARTHEST = 0.95
+"""A step ends where w is no more."""
+LEFT_OUT = 0.02
+"""What B's series leaves out may have this part of what is wanted."""
+MOST_IN_TIME = 8
+"""Highest degree of B's series in time."""
+MOST_L = 2.0
+"""Steps are of so many L at most, but for few."""
 NOTHING = 1e-20
 """A junction's exponential below this is left out: the rest of its series is, too."""
 
@@ -93,12 +105,6 @@ def degree_for(wanted: float) -> int:
 
 
 @inner
-def longest(degree: int) -> float:
-    """Units up to which a series of exp(-x) to that degree stays below 1/2."""
-    return 0.37 * degree + 1.0
-
-
-@inner
 def fastest(f: FloatArray) -> float:
     """Magnitude of the largest eigenvalue of `flow`'s Jacobian, 1/s, at least."""
     half = 0.5 * (f[A_BY_1] - f[C2_BY_2])
@@ -108,26 +114,61 @@ def fastest(f: FloatArray) -> float:
 
 
 @inner
-def expand_B(
-    V_P: float, p: float, unit: float, degree: int, par: FloatArray, c: FloatArray
-) -> int:
-    """Fill the rows G and B from B's first; returns how many are not rounding."""
-    c[G, 0] = unit * (p - V_P / par[TAU])
-    leak, far = -unit / par[TAU], longest(degree)
-    # what matters at the end of the longest step
-    least = far * ROUNDING * c[B, 0]
+def expand_fast_B(
+    turn: float, leak: float, degree: int, par: FloatArray, c: FloatArray
+) -> None:
+    """Fill the row B from its value and V_P's slope at first, by recursion in w."""
+    now, last, before, one, two, three, four = c[G, 0], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    c[B, 0] = c[IN_TIME, 0]
     for k in range(degree):
+        slope = (now - 2.0 * turn * last + before) + (2.0 * two - four)
+        c[G, k] = slope
+        c[B, k + 1] = par[PER_VOLT] * product(c, G, B, k) * PER[k]
+        now, last, before = leak * slope * PER[k], now, last
+        one, two, three, four = slope, one, two, three
+
+
+@inner
+def expand_B(
+    V_P: float, p: float, L: float, turn: float, degree: int, enough: float,
+    par: FloatArray, c: FloatArray,
+) -> int:  # fmt: skip
+    """Fill the rows B and, as a series in t/L, IN_TIME; returns the degree of that.
+
+    It leaves out what gives V_C1 less than `enough` V, for V_P is slow; where it is
+    not, only B is filled, and 0 returned.
+    """
+    leak, size = -L / par[TAU], L
+    c[G, 0] = L * (p - V_P / par[TAU])
+    c[IN_TIME, 0] = B_at(V_P, par)
+    few = 0
+    while True:
+        if few == MOST_IN_TIME:
+            expand_fast_B(turn, leak, degree, par, c)
+            return 0
         total = 0.0
-        for j in range(k + 1):
-            total += c[G, j] * c[B, k - j]
-        c[B, k + 1] = par[PER_VOLT] * total * PER[k]
-        c[G, k + 1] = leak * c[G, k] * PER[k]
-        least /= far
-        if max(abs(c[B, k]), far * abs(c[B, k + 1])) <= least:
-            for j in range(k, degree + 1):
-                c[B, j] = 0.0
-            return k
-    return degree
+        for j in range(few + 1):
+            total += c[G, j] * c[IN_TIME, few - j]
+        c[IN_TIME, few + 1] = par[PER_VOLT] * total * PER[few]
+        c[G, few + 1] = leak * c[G, few] * PER[few]
+        few += 1
+        size *= MOST_L
+        if size * (abs(c[IN_TIME, few - 1]) + abs(c[IN_TIME, few])) < enough:
+            break
+    # t/L = w (1 - c w)/(1 - w^2) times the highest, then Horner's scheme
+    one, two = c[IN_TIME, few], -turn * c[IN_TIME, few]
+    for k in range(1, degree + 1, 2):
+        c[B, k], c[B, k + 1] = one, two
+    c[B, 0] = c[IN_TIME, few - 1]
+    for n in range(few - 2, -1, -1):
+        before, last, one, two = 0.0, c[B, 0], 0.0, 0.0
+        c[B, 0] = c[IN_TIME, n]
+        for k in range(1, degree + 1):
+            now = c[B, k]
+            one, two = two + (last - turn * before), one
+            c[B, k] = one
+            before, last = last, now
+    return few
 
 
 @inner
@@ -151,28 +192,26 @@ def slopes_known(c: FloatArray, k: int) -> tuple[float, float]:
 
 @inner
 def expand(
-    s: float, y: float, v: float, held: bool, V0: float, p: float, unit: float,
-    degree: int, par: FloatArray, f: FloatArray, c: FloatArray,
+    s: float, y: float, v: float, held: bool, V0: float, p: float, rate: float,
+    L: float, turn: float, degree: int, wanted: float, par: FloatArray,
+    f: FloatArray, c: FloatArray,
 ) -> int:  # fmt: skip
     """Fill the rows of `c` at s after the segment's start, where `flow` is f.
 
-    Returns how many coefficients of B are more than rounding.
+    The last row is what exp(-rate t) would be: how far the series stay stable.
     """
-    # B anew: at the end of a step before, its series had it, to rounding each time
-    V_P = V_P_at(s, V0, p, par[TAU])
-    c[B, 0], c[Q, 0] = B_at(V_P, par), f[OF_Q]
-    few = expand_B(V_P, p, unit, degree, par, c)
+    c[Q, 0] = f[OF_Q]
     v_t, leak, direct = par[V_T], par[I_S1], par[DIRECT] != 0.0
     per_t = 1.0 / v_t
     open_1 = 1.0 + c[Q, 0] > NOTHING
     W_0, P_0 = f[OF_W], 1.0 + f[OF_X]
     P_0 = P_0 if P_0 > NOTHING else 0.0
     # what each coefficient of P and W gives to both slopes
-    to_a, to_c2 = unit / par[T1_C1], 0.0 if held else unit / par[T1_C2]
+    to_a, to_c2 = L / par[T1_C1], 0.0 if held else L / par[T1_C2]
     per_w = 1.0 if direct else v_t / ((1.0 + par[PER_F]) * par[R_E])
     P_to_y, P_to_v = to_a * leak * par[PER_R], -to_c2 * leak * (1.0 + par[PER_R])
     W_to_y, W_to_v = to_a * per_w * par[PER_F], to_c2 * per_w
-    leak_1, leak_2 = unit * par[LAMBDA], 0.0 if held else unit / par[TAU_L]
+    leak_1, leak_2 = L * par[LAMBDA], 0.0 if held else L / par[TAU_L]
     # what stands still, of no further coefficient
     still_y = leak_1 * par[DIVIDER] - to_a * leak * (par[PER_F] + par[PER_R])
     still_v = to_c2 * (par[T1_BIAS] + leak * par[PER_R])
@@ -184,19 +223,35 @@ def expand(
     known_P, by_v = own * W_0 * to_z, own * W_0 * to_z * by
     by_y = by_v + own * W_0 * per_t
     c[Y, 0], c[V, 0], c[P, 0], c[W, 0] = y_k, v_k, P_k, W_k = y, v, P_0, W_0
+    V_P = V_P_at(s, V0, p, par[TAU])
+    few = expand_B(V_P, p, L, turn, degree, LEFT_OUT * wanted, par, c)
+    # slopes by w from L times those by time: (1 - w^2)^2 of the former are
+    # (1 - 2 c w + w^2) of the latter
+    turn *= 2.0
+    more_y = more_v = more_e = 0.0
+    of_y = of_v = of_e = y_1 = y_2 = y_3 = v_1 = v_2 = v_3 = e_1 = e_2 = e_3 = 0.0
+    fade, fades = -L * rate, L * rate > 1.0
+    e_k = 1.0 if fades else 0.0
     for k in range(degree):
         per = PER[k]
+        if fades:
+            last_e, of_e = of_e, fade * e_k
+            to_e = of_e + more_e
+            more_e = (last_e - turn * of_e) + (2.0 * e_1 - e_3)
+            e_1, e_2, e_3 = to_e, e_1, e_2
+            e_k = per * to_e
+        c[FADES, k + 1] = e_k
+        last_y, last_v = of_y, of_v
         of_P, of_W = slopes_known(c, k)
-        closing = 0.0
-        if open_1:
-            for j in range(min(k, few) + 1):
-                closing += c[B, j] * c[Q, k - j]
-        else:
-            closing = -c[B, k]
+        closing = product(c, B, Q, k) if open_1 else -c[B, k]
         # the last coefficients at last: all else waits for them
-        to_y = (unit * closing + still_y - leak_1 * y_k + P_to_y * P_k) + W_to_y * W_k
-        to_v = (still_v - leak_2 * v_k + P_to_v * P_k) + W_to_v * W_k
+        of_y = (L * closing + still_y - leak_1 * y_k + P_to_y * P_k) + W_to_y * W_k
+        of_v = (still_v - leak_2 * v_k + P_to_v * P_k) + W_to_v * W_k
         still_y = still_v = 0.0
+        to_y, to_v = of_y + more_y, of_v + more_v
+        more_y = (last_y - turn * of_y) + (2.0 * y_1 - y_3)
+        more_v = (last_v - turn * of_v) + (2.0 * v_1 - v_3)
+        y_1, y_2, y_3, v_1, v_2, v_3 = to_y, y_1, y_2, to_v, v_1, v_2
         to_W = (own * of_W + known_P * of_P) + (by_v * to_v - by_y * to_y)
         to_P = of_P + by * (to_v - to_y)
         y_k, v_k, P_k, W_k = per * to_y, per * to_v, per * to_P, per * to_W
@@ -214,19 +269,10 @@ def expand(
 
 
 @inner
-def B_of(c: FloatArray, few: int, x: float) -> float:
-    """B's series at x units, of which the terms from `few` on are rounding."""
-    total = 0.0
-    for k in range(few - 1, -1, -1):
-        total = total * x + c[B, k]
-    return total
-
-
-@inner
 def two_at(
     c: FloatArray, one: int, two: int, degree: int, x: float
 ) -> tuple[float, float]:
-    """Two of the series at x units: even and odd terms apart, none waits for long."""
+    """Two of the series at w = x: even and odd terms apart, none waits for long."""
     top, square = degree - degree % 2, x * x
     a, odd_a = c[one, top], c[one, top + 1]
     b, odd_b = c[two, top], c[two, top + 1]
@@ -240,7 +286,7 @@ def two_at(
 def ends_at(
     c: FloatArray, degree: int, x: float
 ) -> tuple[float, float, float, float, float]:
-    """V_C1, V_C2, their slopes and W after x units, as `two_at` has them."""
+    """V_C1, V_C2, their slopes and W at w = x, as `two_at` has them."""
     top, square = degree - degree % 2, x * x
     a, odd_a = c[Y, top], c[Y, top + 1]
     b, odd_b = c[V, top], c[V, top + 1]
@@ -257,31 +303,40 @@ def ends_at(
 
 
 @inner
-def reached(c: FloatArray, degree: int, wanted: float) -> float:
-    """How far the series go before their last two terms exceed `wanted`, units."""
-    far = 600.0
+def reached(c: FloatArray, degree: int, wanted: float) -> tuple[float, bool]:
+    """How far the series go before their last two terms exceed `wanted`, as w.
+
+    And whether what bounds it is that they would not be stable farther.
+    """
+    far, stiff = 0.0, False
     for k in (degree - 1, degree):
-        size = max(abs(c[Y, k]), abs(c[V, k]), 1e-300)
-        far = min(far, math.log(wanted / size) / k)
-    return math.exp(far)
+        room = wanted / max(abs(c[Y, k]), abs(c[V, k]), 1e-300)
+        stable = 0.5 / max(abs(c[FADES, k]), 1e-300)
+        reach = math.log(min(room, stable)) / k
+        if reach < far:
+            far, stiff = reach, stable < room
+    return min(math.exp(far), FARTHEST), stiff
 
 
 @inner
-def highest(row: FloatArray, degree: int, x: float) -> float:
-    """What the series does not exceed up to x units."""
+def highest(row: FloatArray, degree: int, x: float, end: float) -> float:
+    """What the series does not exceed up to w = x, where it is `end`.
+
+    Above the chord between both lie only the terms that curve it down.
+    """
     top, square = degree - degree % 2, x * x
-    even, odd = abs(row[top]), abs(row[top + 1])
+    even, odd = min(row[top], 0.0), min(row[top + 1], 0.0)
     for k in range(top - 2, 0, -2):
-        even = even * square + abs(row[k])
-        odd = odd * square + abs(row[k + 1])
-    return float(row[0] + (even * x + odd * square + abs(row[1])) * x)
+        even = even * square + min(row[k], 0.0)
+        odd = odd * square + min(row[k + 1], 0.0)
+    return float(max(row[0], end) - (even + x * odd) * square)
 
 
 @inner
 def to_chebyshev(
     row: FloatArray, degree: int, x: float, part: FloatArray, a: FloatArray
 ) -> None:
-    """The series from 0 to x units as one of Chebyshev's, its last digits kept."""
+    """The series from 0 to w = x as one of Chebyshev's in w, its last digits kept."""
     for i in range(ORDER + 1):
         part[i] = row[degree]
     for k in range(degree - 1, 0, -1):
@@ -294,104 +349,70 @@ def to_chebyshev(
 
 
 @inner
-def moved(
-    h: float, a: FloatArray, m: FloatArray, b: FloatArray, step: FloatArray
-) -> None:
-    """What a volt at the start moves at the end of h s: `flow` at start, middle, end.
+def in_time(
+    row: FloatArray, degree: int, half: int, step: FloatArray, part: FloatArray,
+    a: FloatArray,
+) -> tuple[float, float]:  # fmt: skip
+    """The first or second half of a step's series as one of Chebyshev's in time.
 
-    Magnus's exponential of order 4: of Simpson's mean of the Jacobians less h^2/12
-    times the first one's commutator with the last.
+    Returns when it begins, s after the step, and how long it is.
     """
-    k = h / 6.0
-    p = k * (a[A_BY_1] + 4.0 * m[A_BY_1] + b[A_BY_1])
-    q = k * (a[A_BY_2] + 4.0 * m[A_BY_2] + b[A_BY_2])
-    r = k * (a[C2_BY_1] + 4.0 * m[C2_BY_1] + b[C2_BY_1])
-    s = k * (a[C2_BY_2] + 4.0 * m[C2_BY_2] + b[C2_BY_2])
-    k = h * h / 12.0
-    turn = k * (a[A_BY_2] * b[C2_BY_1] - b[A_BY_2] * a[C2_BY_1])
-    apart_a, apart_b = a[A_BY_1] - a[C2_BY_2], b[A_BY_1] - b[C2_BY_2]
-    p, s = p - turn, s + turn
-    q -= k * (apart_a * b[A_BY_2] - apart_b * a[A_BY_2])
-    r += k * (apart_a * b[C2_BY_1] - apart_b * a[C2_BY_1])
-    mean, half = 0.5 * (p + s), 0.5 * (p - s)
-    square = half * half + q * r
-    root = math.sqrt(abs(square))
-    if square > 0.0 and root > 300.0:
-        # the other eigenvalue has nothing left to say
-        even = 0.5 * math.exp(mean + root)
-        mean, odd = 0.0, even / root
-    elif root < 1e-3:
-        even, odd = 1.0 + 0.5 * square, 1.0 + square / 6.0
-    elif square > 0.0:
-        up = math.exp(root)
-        even, odd = 0.5 * (up + 1.0 / up), 0.5 * (up - 1.0 / up) / root
-    else:
-        even, odd = math.cos(root), math.sin(root) / root
-    scale = math.exp(mean)
-    step[MOVED], step[MOVED + 1] = scale * (even + odd * half), scale * odd * q
-    step[MOVED + 2], step[MOVED + 3] = scale * odd * r, scale * (even - odd * half)
-
-
-@inner
-def rested(
-    h: float, y: float, v: float, f: FloatArray, a: FloatArray, b: FloatArray,
-    step: FloatArray,
-) -> None:  # fmt: skip
-    """A step of h s on which both voltages stay where they are, to rounding.
-
-    It is wrong by how far the equilibrium is, which `flow` at the start tells.
-    """
+    L, turn = step[STRETCH], step[TURN]
+    begins, length = 0.0, time_at(0.5 * step[REACH], L, turn)
+    if half == 1:
+        begins, length = length, step[LENGTH] - length
+    first = 0.0
     for i in range(ORDER + 1):
-        a[i] = b[i] = 0.0
-    a[0], b[0] = y, v
-    step[Y_END], step[V_END] = y, v
-    moved(h, f, f, f, step)
-    # Cramer's rule
-    by_all = abs(f[A_BY_1] * f[C2_BY_2] - f[A_BY_2] * f[C2_BY_1])
-    one, two = abs(f[TO_A]), abs(f[TO_C2])
-    step[LEFT_1] = (one * abs(f[C2_BY_2]) + two * abs(f[A_BY_2])) / by_all
-    step[LEFT_2] = (one * abs(f[C2_BY_1]) + two * abs(f[A_BY_1])) / by_all
-    step[STAYS_1], step[STAYS_2] = step[LEFT_1], step[LEFT_2]
-    step[LENGTH], step[GROWTH], step[UNITS] = h, 1.0, 1e300
+        w = w_at(begins + length * POINTS[i], L, turn)
+        value = 0.0
+        for k in range(degree, 0, -1):
+            value = (value + row[k]) * w
+        first = value if i == 0 else first
+        part[i] = value - first
+    to_series(part, a)
+    a[0] += row[0] + first
+    return begins, length
 
 
 @inner
 def end_at(
-    s: float, x: float, unit: float, held: bool, V0: float, p: float, degree: int,
-    par: FloatArray, c: FloatArray, g: FloatArray, step: FloatArray,
+    x: float, held: bool, degree: int, par: FloatArray, c: FloatArray, g: FloatArray,
+    step: FloatArray,
 ) -> tuple[float, float]:  # fmt: skip
-    """Let the step end after x units; g becomes `flow` there.
+    """Let the step end at w = x; g becomes `flow` there.
 
-    Returns the slopes of both series there, V per unit.
+    Returns the slopes of both series there, V.
     """
     y, v, to_y, to_v, near = ends_at(c, degree, x)
-    step[Y_END], step[V_END] = y, v
+    h = time_at(x, step[STRETCH], step[TURN])
+    step[Y_END], step[V_END], step[LENGTH], step[REACH] = y, v, h, x
     few = int(step[TERMS])
-    if few < degree:
-        B_end = B_of(c, few, x)
-    else:
-        B_end = B_at(V_P_at(s + x * unit, V0, p, par[TAU]), par)
+    row, u = (IN_TIME, h / step[STRETCH]) if few else (B, x)
+    B_end = 0.0
+    for k in range(few if few else degree, -1, -1):
+        B_end = B_end * u + c[row, k]
     flow_near(B_end, y, v, near, held, par, g)
     return to_y, to_v
 
 
 @inner
 def move(
-    x: float, unit: float, held: bool, degree: int, par: FloatArray, c: FloatArray,
-    f: FloatArray, m: FloatArray, g: FloatArray, step: FloatArray,
+    held: bool, degree: int, par: FloatArray, c: FloatArray, f: FloatArray,
+    m: FloatArray, g: FloatArray, step: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill what a volt at the start moves after x units; f and g are `flow` there.
+    """Fill what a volt at the start moves at the end; f and g are `flow` there.
 
     In the middle the series tell it.
     """
-    P_m, W_m = two_at(c, P, W, degree, 0.5 * x)
+    x = w_at(0.5 * step[LENGTH], step[STRETCH], step[TURN])
+    P_m, W_m = two_at(c, P, W, degree, x)
     B_m, Q_m = c[B, 0], -1.0
     if 1.0 + c[Q, 0] > NOTHING:
-        B_m, Q_m = two_at(c, B, Q, degree, 0.5 * x)
+        B_m, Q_m = two_at(c, B, Q, degree, x)
     of_junctions(P_m - 1.0, W_m, par, m)
     # of the Jacobian, not the slopes: it depends on no voltage but by these
     with_node_a(B_m, Q_m, 1.0 + Q_m, 0.0, 0.0, held, par, m)
-    moved(x * unit, f, m, g, step)
+    moved(step[LENGTH], f, m, g, step)
 
 
 @inner
@@ -406,21 +427,29 @@ def expanded(
     there, which are left in `g`. It takes `room` s at most. Returns 0 where none is
     short enough.
     """
-    unit = 1.0 / rate
-    step[TERMS] = expand(s, y, v, held, V0, p, unit, degree, par, f, c)
-    x = reached(c, degree, wanted)
-    step[LENGTH] = (x if x > 0.1 else 0.1) * unit
-    x = min(x, longest(degree), room * rate)
+    L, turn = stretch(f, rate, held, par)
+    step[STRETCH], step[TURN] = L, turn
+    step[TERMS] = expand(s, y, v, held, V0, p, rate, L, turn, degree, wanted, par, f, c)
+    aim = AIM * wanted
+    x, stiff = reached(c, degree, aim)
+    first = max(time_at(x, L, turn), 0.1 / rate)
+    whole = time_at(x, L, turn) >= room
+    if whole:
+        x = w_at(room, L, turn)
     for _ in range(8):
-        to_y, to_v = end_at(s, x, unit, held, V0, p, degree, par, c, g, step)
-        share = SAFETY * x / (degree + 1)
-        left_1 = share * abs(unit * g[TO_A] - to_y)
-        left_2 = share * abs(unit * g[TO_C2] - to_v)
-        if max(left_1, left_2) <= 3.0 * wanted:
-            step[LENGTH] = x * unit if x < room * rate else room
+        to_y, to_v = end_at(x, held, degree, par, c, g, step)
+        share, pace = SAFETY * x / (degree + 1), pace_at(x, L, turn)
+        left_1 = share * abs(pace * g[TO_A] - to_y) + LEFT_OUT * wanted
+        left_2 = share * abs(pace * g[TO_C2] - to_v)
+        if max(left_1, left_2) <= 3.0 * aim:
+            if whole:
+                step[LENGTH] = room
+            step[STIFF] = 1.0 if stiff and not whole else 0.0
             step[LEFT_1] = step[STAYS_1] = left_1
             step[LEFT_2] = step[STAYS_2] = left_2
-            step[GROWTH], step[UNITS] = 1.0, x
+            step[GROWTH] = 1.0
             return degree
-        x *= 0.7
+        x *= 0.8
+        whole = False
+    step[LENGTH] = first
     return 0

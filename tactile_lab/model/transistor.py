@@ -42,23 +42,24 @@ def of_junctions(X: float, W: float, par: FloatArray, out: FloatArray) -> None:
     """
     out[OF_X], out[OF_W] = X, W
     J = par[I_S1] * X
-    J_v = (J + par[I_S1]) / par[V_T]
-    a = 1.0 + par[PER_F]
+    per_t, per_1, per_2 = 1.0 / par[V_T], 1.0 / par[T1_C1], 1.0 / par[T1_C2]
+    J_v = (J + par[I_S1]) * per_t
     if par[DIRECT] != 0.0:
         I_F = W - par[I_S1]
-        F_y, F_v = -W / par[V_T], 0.0
+        F_y, F_v = -W * per_t, 0.0
     else:
-        I_F = par[V_T] / (a * par[R_E]) * W - par[I_S1]
-        g = W / (1.0 + W) / (a * par[R_E])
+        per_R = 1.0 / ((1.0 + par[PER_F]) * par[R_E])
+        I_F = par[V_T] * per_R * W - par[I_S1]
+        g = W / (1.0 + W) * per_R
         F_v = g * par[R_E] * J_v
         F_y = -g - F_v
-    r = 1.0 + par[PER_R]
-    out[TO_A] = (I_F * par[PER_F] + J * par[PER_R]) / par[T1_C1]
-    out[TO_C2] = (I_F - J * r + par[T1_BIAS]) / par[T1_C2]
-    out[A_BY_1] = (F_y * par[PER_F] - J_v * par[PER_R]) / par[T1_C1]
-    out[A_BY_2] = (F_v * par[PER_F] + J_v * par[PER_R]) / par[T1_C1]
-    out[C2_BY_1] = (F_y + J_v * r) / par[T1_C2]
-    out[C2_BY_2] = (F_v - J_v * r) / par[T1_C2]
+    J_1, J_2 = par[PER_R], 1.0 + par[PER_R]
+    out[TO_A] = (I_F * par[PER_F] + J * J_1) * per_1
+    out[TO_C2] = (I_F - J * J_2 + par[T1_BIAS]) * per_2
+    out[A_BY_1] = (F_y * par[PER_F] - J_v * J_1) * per_1
+    out[A_BY_2] = (F_v * par[PER_F] + J_v * J_1) * per_1
+    out[C2_BY_1] = (F_y + J_v * J_2) * per_2
+    out[C2_BY_2] = (F_v - J_v * J_2) * per_2
 
 
 @inner
