@@ -58,7 +58,7 @@ class Instruments:
             meter=read("field meter", bench.field_meter, READ_FIELD),
             thermometer=read("thermometer", bench.thermometer, READ_TEMPERATURE),
             voltages=tuple(
-                VoltageThread(name, source, clock)
+                VoltageThread(name, source, clock, stop)
                 for name, source in bench.voltage_sources.items()
             ),
         )

@@ -1,10 +1,14 @@
-"""A voltage source's thread: ramps to what is wanted, and reads back what it holds."""
+"""A voltage source's thread: ramps to what is wanted, and reads back what it holds.
+
+A stop leaves it where it is until the coil is off; then it goes to rest.
+"""
 
 from __future__ import annotations
 
 from collections import deque
 
 from tactile_lab.acquisition.instrument_thread import InstrumentThread, drained
+from tactile_lab.acquisition.stop import StopRequest
 from tactile_lab.clock import Clock
 from tactile_lab.errors import TactileLabError
 from tactile_lab.voltage_source import HeldVoltage, RestReport, VoltageSource
@@ -24,9 +28,11 @@ class VoltageThread(InstrumentThread):
         left: how it was left; None while it is in use.
     """
 
-    def __init__(self, voltage: str, source: VoltageSource, clock: Clock) -> None:
+    def __init__(
+        self, voltage: str, source: VoltageSource, clock: Clock, stop: StopRequest
+    ) -> None:
         super().__init__(f"source of {voltage}", clock)
-        self.voltage, self.source = voltage, source
+        self.voltage, self.source, self._stop = voltage, source, stop
         self.left: RestReport | None = None
         self.wanted: float | None = None
         self._reached: float | None = None
@@ -56,13 +62,13 @@ class VoltageThread(InstrumentThread):
         while not self._leaving:
             began, wanted = self.clock.now(), self.wanted
             due = began + READ_EVERY
-            if wanted is not None and wanted != self._reached:
+            if wanted is not None and wanted == self._reached:
+                self._readings.append(self.source.read())
+            elif wanted is not None and not self._stop.requested:
                 due = began + STEP_EVERY
                 if self.source.step_to(wanted):
                     self._reached = wanted
                     self.clock.notify()
-            elif wanted is not None:
-                self._readings.append(self.source.read())
             self._rest_until(due, wanted)
 
     def make_safe_and_close(self) -> None:

@@ -2,12 +2,14 @@
 
 import csv
 import json
+import re
 from types import SimpleNamespace
 
 import pytest
 from benches import WITH_A_SOURCE_METER
 
 from sim_backend.bench import open_bench
+from sim_backend.serial_line import wires
 from sim_backend.serial_line.faults import SerialFault
 from sim_backend.voltage_source import LoadFault
 from tactile_lab.acquisition.events import RunState, StateChanged, VoltageRead
@@ -51,6 +53,28 @@ def execute(tmp_path):
         return Execution(scene, tmp_path / "runs", bench=bench, emit=emit).run()
 
     return run
+
+
+def test_a_voltage_on_its_way_goes_no_further_once_a_stop_is_accepted(scene, tmp_path):
+    """It rose for another 0.3 s, until the coil was off. STOP is on the wire here."""
+    held = scene(*HELD, "sensor.V_GS=1.405 V")
+    bench = open_bench(held, needs(held))
+    execution = Execution(held, tmp_path / "runs", bench=bench)
+    far = [far for name, far in wires._far_ends.items() if "V_GS" in name][-1]
+    act, sent = far.instrument.line, []
+
+    def heard(line: bytes) -> bytes | None:
+        if step := re.match(rb":SOUR:VOLT ([\d.]+)", line):
+            sent.append(float(step[1]))
+        if sent and sent[-1] > 0.3:
+            execution.stop("enough")
+        return act(line)
+
+    far.instrument.line = heard
+    done = execution.run()
+    assert done.state is RunState.ABORTED and done.off.verified
+    (beyond,) = (one for one in sent if one > 0.3)  # then it went down at once
+    assert beyond == max(sent) and sent[-1] == 0.0
 
 
 def test_V_GS_is_set_held_logged_and_left_at_rest(scene, execute):
