@@ -381,3 +381,18 @@ def test_two_waiting_runs_are_seen_in_a_low_panel_and_three_in_a_high_one(app) -
             button = card.buttons["close"]
             assert card.rect().contains(button.geometry()), "no button is cut"
     view.close()
+
+
+def test_a_stop_that_finds_its_run_just_over_begins_no_other(lab) -> None:
+    """The window has not heard of the end when STOP is pressed."""
+    session, setup = lab.session, lab.window.setup
+    setup.buttons.queue.click()
+    lab.until(lambda: waiting(lab) and waiting(lab)[0].expectation is not None)
+    setup.run.click()
+    session.queue.held = False
+    assert session.run.task.join(60)
+    session.stop("STOP")
+    assert session.state is WindowState.ABORTING
+    lab.until(lambda: session.state is WindowState.READY)
+    lab.until(lambda: session.link.idle)
+    assert len(waiting(lab)) == 1 and session.queue.held and not session.busy
