@@ -98,6 +98,33 @@ def test_stop_takes_the_current_back_at_the_slew_limit(run_scene, bench, voltage
     assert time[falls][-1] - time[falls][0] == pytest.approx(0.175, rel=0.1)
 
 
+def test_a_stop_before_the_generator_begins_leaves_it_at_0_V(
+    run_scene, bench, voltages
+):
+    """It was started, and taken back from there."""
+    running = []
+
+    def made(scene):
+        made = open_bench(scene, needs(scene))
+        follow = made.coil.follow
+
+        def followed(*asked):
+            follow(*asked)
+            running[0].stop("as it is to begin")
+
+        made.coil.follow = followed
+        return made
+
+    ended = run_scene(
+        *WAVE,
+        scene=load("demo", bench=bench),
+        bench=made,
+        watch=lambda execution, event: running.append(execution),
+    ).done
+    assert ended.state is RunState.ABORTED and ended.off.verified
+    assert {volts for _, volts in voltages} <= {0.0}
+
+
 def test_a_scope_that_is_lost_while_it_plays_ends_with_the_output_off(run_scene, bench):
     def lost(scene):
         fault = ScopeFault(kind="unplug", time=0.9)
