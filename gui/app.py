@@ -21,6 +21,7 @@ from gui.session.session import Session
 from gui.tool_tips import ToolTips
 from gui.within_reach import WithinReach
 from tactile_lab.engine.memory import map_large, share_heap
+from tactile_lab.engine.process import SECOND, take_place
 from tactile_lab.engine.threads import start
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ def main(
     Returns:
         Exit code: 0, or 4 where the coil's safe state could not be verified.
     """
+    take_place(SECOND)
     # Python threads hand over every 5 ms by default: too long for a frame of 33 ms
     sys.setswitchinterval(1e-3)
     share_heap()

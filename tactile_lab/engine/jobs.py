@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 from tactile_lab.engine.engine import Engine
 from tactile_lab.engine.events import ModelPart
+from tactile_lab.engine.process import BEHIND, take_place
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import RecordingError, RefusedError, TactileLabError
 from tactile_lab.lab import lab
@@ -255,6 +256,7 @@ def follow_run(engine: Engine, folder: Path) -> str:
     Raises:
         SceneError: the lab's file cannot be read.
     """
+    take_place(BEHIND)  # of the thread of this question
     return lab().follow(folder)
 
 

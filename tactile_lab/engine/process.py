@@ -10,6 +10,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 
@@ -23,8 +24,9 @@ if FORKS:
 
 Serve = Callable[[Connection, bool], None]
 
-BEHIND = 5
-"""Niceness of what works beside runs: on a busy computer a third of their share."""
+FIRST, SECOND, BEHIND = -10, -5, 5
+"""Niceness of what holds instruments; of the window, through whose thread STOP comes;
+and of what works beside them: on a busy computer it has a third of the usual share."""
 
 
 def load_ahead() -> None:
@@ -80,10 +82,15 @@ class EngineProcess:
             self._pipe.close()
 
 
-def step_back() -> None:
-    """Have this process, and what it starts, leave the processor to runs."""
-    if hasattr(os, "nice"):
-        os.nice(BEHIND)
+def take_place(niceness: int) -> None:
+    """Ask for this thread's place among what a busy computer runs.
+
+    What it starts from then on has it, too. To come before others has to be allowed,
+    which it mostly is not. Nothing where it would be the whole process's.
+    """
+    if sys.platform == "linux":
+        with suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, 0, niceness)
 
 
 def _main(
@@ -94,8 +101,7 @@ def _main(
     behind: bool,
 ) -> None:
     """Serve in the environment of who asked, which the one forked from may not have."""
-    if behind:
-        step_back()
+    take_place(BEHIND if behind else FIRST)
     os.environ.clear()
     os.environ.update(environment)
     serve(pipe, realtime)

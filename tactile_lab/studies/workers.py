@@ -26,7 +26,7 @@ from threading import Thread
 from typing import NamedTuple, Protocol
 
 from tactile_lab.engine.cluster import cluster
-from tactile_lab.engine.process import step_back
+from tactile_lab.engine.process import BEHIND, take_place
 from tactile_lab.errors import LinkLostError, SceneError
 from tactile_lab.studies.points import Points, PointTask
 from tactile_lab.studies.shelf import Batch, Shelf, put
@@ -251,7 +251,7 @@ def _end_when(told: Connection) -> None:
 
     Whatever holds instruments on this computer comes before it.
     """
-    step_back()
+    take_place(BEHIND)
     parent = parent_process()
     if parent is not None:
         ends: list[Connection | int] = [told, parent.sentinel]

@@ -38,6 +38,7 @@ from gui.session.session import Session
 from gui.window import Window
 from tactile_lab.engine import link
 from tactile_lab.engine.memory import map_large, share_heap
+from tactile_lab.engine.process import SECOND, take_place
 
 SCENE = """
 [protocol]
@@ -185,8 +186,9 @@ class Watched:
 def main() -> None:
     """Open the window in the working folder and stay until it is closed."""
     vars(link)["main"] = watched_engine.main
+    take_place(SECOND)  # as the program does
     sys.setswitchinterval(1e-3)
-    share_heap()  # as the program does
+    share_heap()
     map_large()
     listen_to_trouble()
     watched = Watched()
