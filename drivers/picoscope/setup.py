@@ -10,6 +10,7 @@ from drivers.picoscope import status
 from drivers.picoscope.sdk import COUPLINGS, INPUTS, RANGES, TIME_UNITS
 from drivers.picoscope.unit import ScopeUnit
 from tactile_lab.errors import LimitError
+from tactile_lab.quantity import show
 from tactile_lab.scope import Channel
 
 _LEAST_RING, _MOST_RING = 1 << 16, 1 << 23
@@ -27,8 +28,8 @@ def streaming_interval(interval: float) -> tuple[int, float]:
             if interval * per_second < (1 << 32) - 0.5:
                 return round(interval * per_second), per_second
     raise LimitError(
-        f"A sample interval of {interval:g} s is impossible; this scope takes 8 ns to "
-        "4.2e6 s."
+        f"A sample interval of {show(interval, 's')} is impossible; this scope takes "
+        "8 ns to 4.2 Ms. Change record.sample_rate."
     )
 
 

@@ -59,7 +59,7 @@ class LiveSource(Source):
         self._carried: tuple[object, ...] = ()
         self._twin_spikes = NONE
         self._gain = newtons_per_ampere
-        self._loop: list[tuple[float, float, float]] = []
+        self._loop: list[tuple[float, float]] = []
         self._pyramids: dict[str, Pyramid] = {}
         self._streamed = 0.0  # to where; asked 50 times a frame
         self._slow = {name: Readings() for name in ("force", *AVERAGED)}
@@ -181,15 +181,20 @@ class LiveSource(Source):
     def add_field(self, time: float, tesla: float) -> None:
         """A reading of the teslameter."""
         self._slow["field"].add(time, tesla)
-        force = self._slow["force"].last
-        if force is not None and len(self._loop) < 50_000:
-            self._loop.append((time, force / self._gain, tesla))
+        if len(self._loop) < 50_000:
+            self._loop.append((time, tesla))
 
     @property
     def loop(self) -> FloatArray:
-        """Shape (n, 2): coil current, A, and the field read then, T; on steps only."""
-        found = np.array(self._loop, dtype=np.float64).reshape(-1, 3)
-        return found[settled(found[:, 0], self.holds), 1:]
+        """Shape (n, 2): coil current, A, and the field read under it, T; on steps only.
+
+        A reading is told after currents that were set since it was taken.
+        """
+        time, tesla = np.array(self._loop, dtype=np.float64).reshape(-1, 2).T
+        inside = settled(time, self.holds)
+        current = self._slow["force"].at(time[inside]) / self._gain
+        found = np.column_stack((current, tesla[inside]))
+        return found[np.isfinite(current)]
 
     def begin_trial(self, index: int, hold: Stretch) -> None:
         """A trial starts; the preview is moved to where it really starts."""
@@ -255,6 +260,11 @@ class Readings:
     def last(self) -> float | None:
         """The last reading."""
         return float(self._rows[1, self._count - 1]) if self._count else None
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """The reading that holds at each of `times`, s; NaN before the first."""
+        before = np.searchsorted(self._rows[0, : self._count], times, side="right")
+        return np.concatenate([[np.nan], self._rows[1, : self._count]])[before]
 
     def until(self, time: float) -> Readings:
         """Those up to a time, s, which no later ones are added to."""

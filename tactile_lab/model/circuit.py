@@ -266,13 +266,13 @@ def _checked(name: str, value: object, of: Unit) -> float:
         raise ParameterError(
             f"{name} = {value!r} must be a number in {unit or 'ones'}."
         )
-    number = float(value)
+    number, spaced = float(value), f" {unit}" if unit else ""
     if not math.isfinite(number):
-        raise ParameterError(f"{name} = {number} {unit} must be finite.")
+        raise ParameterError(f"{name} = {number}{spaced} must be finite.")
     if of.above is not None and not SMALLEST <= number <= LARGEST:
         raise ParameterError(
-            f"{name} = {number:g} {unit} must lie between {SMALLEST:g} and "
-            f"{LARGEST:g} {unit}."
+            f"{name} = {number:g}{spaced} must lie between {SMALLEST:g} and "
+            f"{LARGEST:g}{spaced}."
         )
     if unit == "V" and abs(number) > LARGEST_VOLTAGE:
         raise ParameterError(

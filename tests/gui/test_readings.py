@@ -5,6 +5,7 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from gui.lanes.card import LINE, TITLE, LaneCard
+from gui.lanes.expected import Stretch
 from gui.lanes.lane import Lane, lanes_for
 from gui.lanes.live import LiveSource
 from gui.lanes.readings import (
@@ -170,6 +171,22 @@ def test_what_a_meter_reads_is_read_where_its_own_lane_ends() -> None:
         source.add_reading("temperature", time, kelvin)
     source.running = False
     assert (_right(source, "field"), _right(source, "temperature")) == (100.0, 296.0)
+
+
+def test_the_loop_pairs_a_field_with_the_current_it_was_read_under() -> None:
+    """A meter answers late: by then the current of the next step had been told."""
+    source = LiveSource(None, 0.2)
+    source.begin_trial(0, Stretch(0.0, 1.0, "0.4 A", held=(0.1, 0.95)))
+    source.add_field(0.15, 0.0001)  # nobody knows under which current
+    source.add_current(0.2, 0.4)
+    source.add_field(0.5, 0.0044)
+    source.begin_trial(1, Stretch(1.0, 2.0, "0.8 A", held=(1.1, 1.95)))
+    source.add_current(1.01, 0.8)
+    source.add_field(0.94, 0.0044)  # read before, answered after
+    source.add_field(1.5, 0.0088)
+    assert source.loop == pytest.approx(
+        np.array([[0.4, 0.0044], [0.4, 0.0044], [0.8, 0.0088]])
+    )
 
 
 def test_a_residual_is_read_where_the_model_has_come_to() -> None:
