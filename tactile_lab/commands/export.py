@@ -75,7 +75,8 @@ def command(
         except OSError as error:
             if error.errno is None:
                 raise  # HDF5 could not read
-            fail(f"{out or run} cannot be written: {error.strerror}.", 2)
+            said = f"{out or run} cannot be written: {error.strerror}."
+            fail(f"{said} Name another place with --out.", 2)
             return
     from tactile_lab.quantity import bytes_text
 

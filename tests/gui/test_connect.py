@@ -26,6 +26,7 @@ from gui.state import FaultNotice, WindowState
 from sim_backend.serve import ServedBench
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.engine.commands import answer
+from tactile_lab.engine.engine import Engine
 from tactile_lab.engine.events import Ended, PersonAsked
 from tactile_lab.engine.link import RemoteTask
 from tactile_lab.engine.request import Request
@@ -199,7 +200,7 @@ def test_run_waits_for_a_person_until_it_is_done_or_stopped(lab) -> None:
     assert "0 V" in window.question.text.text()
     assert window.question.entry.isHidden(), "there is nothing to type"
     window.question.done.click()
-    assert done == [(answer, "")] and not window.question.isVisible()
+    assert done == [(Engine.say, answer, "")] and not window.question.isVisible()
     session.run.take(PersonAsked("Put them on V_S."))
     lab.until(window.question.isVisible)
     session.run.take(Ended(Ending.refused("stopped at the bench")))
