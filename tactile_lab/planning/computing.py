@@ -35,7 +35,7 @@ PER_HELD_SECOND = 5.8e-3
 STORED, DETECTED = 0.006, 0.006
 """Per million samples of one channel: rendered, compressed, read again and drawn; and
 of the one on which spikes are looked for, s."""
-COMPARED, COMPARED_TRIAL = 0.32, 0.097
+COMPARED, COMPARED_TRIAL = 0.32, 0.05
 COMPARED_POINT, COMPARED_SPIKE = 1.33e-3, 3.3e-3
 """Of the model beside the run, which is solved once as it is believed and once for each
 cause of uncertainty: with its figure, per trial, per set-point or point of a list, and
@@ -48,8 +48,10 @@ BASE = 270e6
 """Memory of the program with its instruments and figures, bytes."""
 MEMORY_CHANNEL = 12e6
 """What is kept of a channel's stream, bytes."""
-MEMORY_POINT = 28e3
-"""Per set-point or point of a list in the model beside the run, bytes."""
+MEMORY_MILLION = 15e3
+"""Per million samples of one channel: of pyramids, live and stored, bytes."""
+MEMORY_POINT = 1.5e3
+"""Per set-point or point of a list: the force it makes, behind the lags, bytes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,6 +129,7 @@ def computing(
     if needed.detect_on is not None:
         told["detection"] = DETECTED * millions
     memory = BASE + MEMORY_CHANNEL * len(needed.channels)
+    memory += MEMORY_MILLION * millions * len(needed.channels)
     if compared(scene, needed):
         told["model beside the run"] = (
             COMPARED

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -21,6 +21,8 @@ PIECE = 1 << 20
 """Samples read at a time."""
 ROWS = 1 << 18
 """Samples handed on at a time, of each signal."""
+AT_ONCE = 1 << 20
+"""Bins of the pyramid read at once, and kept where there are no more: 15 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,11 +183,29 @@ class StoredSignal:
             codes = self.codes[start:stop]
             every = np.arange(start, stop)
             return self._cells(every, stop, per, (codes, codes, codes))
-        first, last = start // BIN, -(-stop // BIN)
-        starts, bins = self._whole_in_time(first, self._bins_between(first, last))
+        first, last, cell = start // BIN, -(-stop // BIN), -(-per // BIN)
+        many = max(1, AT_ONCE // cell) * cell
+        parts = [
+            self._of_bins(at, min(at + many, last), cell, first=at == first)
+            for at in range(first, last, many)
+        ]
+        if len(parts) == 1:
+            return parts[0]
+        return replace(
+            parts[0],
+            time=np.concatenate([part.time for part in parts]),
+            low=np.concatenate([part.low for part in parts]),
+            high=np.concatenate([part.high for part in parts]),
+            mean=np.concatenate([part.mean for part in parts]),
+            gap=np.concatenate([part.gap for part in parts]),
+        )
+
+    def _of_bins(self, begin: int, end: int, cell: int, *, first: bool) -> Trace:
+        """Bins of the pyramid, numbers `begin` to `end`, as cells of `cell` of them."""
+        starts, bins = self._whole_in_time(begin, self._bins_between(begin, end))
         columns = (bins["low"], bins["high"], bins["sum"])
-        end = min(last * BIN, self._length)
-        return self._cells(starts, end, -(-per // BIN) * BIN, columns)
+        stop = min(end * BIN, self._length)
+        return self._cells(starts, stop, cell * BIN, columns, first=first)
 
     def _cells(
         self,
@@ -193,6 +213,8 @@ class StoredSignal:
         end: int,
         per: int,
         columns: tuple[Any, Any, Any],
+        *,
+        first: bool = True,
     ) -> Trace:
         """Join what lies in `per` samples; after a gap as long a new cell begins.
 
@@ -201,10 +223,12 @@ class StoredSignal:
             end: one past the last sample of the last entry.
             per: samples in a cell.
             columns: smallest, largest and sum of each entry.
+            first: whether nothing comes before them.
         """
         low, high, total = columns
         width = per * self.interval
         late = self.axis.after_gaps(width - self.interval / 2)
+        begins = first or bool(np.isin(starts[0], late))
         late = np.searchsorted(starts, late[(late > starts[0]) & (late < end)])
         edges = np.searchsorted(starts, np.arange(starts[0], end, per))
         if late.size:
@@ -218,7 +242,8 @@ class StoredSignal:
         # a negative gain turns smallest into largest
         least, most = np.minimum(one, other), np.maximum(one, other)
         gap = np.zeros(edges.size, np.bool_)
-        gap[np.searchsorted(edges, late)] = gap[0] = True
+        gap[np.searchsorted(edges, late)] = True
+        gap[0] = begins
         time = self.axis.time_of(starts)
         return Trace(time, least, most, mean, gap, width, self.name, self.unit)
 
@@ -270,11 +295,11 @@ class StoredSignal:
         return parts
 
     def _bins_between(self, first: int, last: int) -> NDArray[Any]:
-        """Entries of the pyramid. A small part is read, the whole is read and kept."""
+        """Entries of the pyramid; one that is not large is read as a whole and kept."""
         count = -(-self._length // BIN)
         if self._bins is not None and len(self._bins) >= count:
             return self._bins[first:last]
-        if last - first < count // 4:
+        if last - first < count // 4 or count > AT_ONCE:
             return self._read_bins(first, last)
         self._bins = self._read_bins(0, count)
         return self._bins[first:last]

@@ -57,6 +57,11 @@ def test_every_cell_holds_the_samples_of_its_own_time(bench, records, unseen, ce
             np.testing.assert_allclose(signal[:], volts, atol=1e-12)
 
             trace = signal.trace(cells=cells)
+            with pytest.MonkeyPatch.context() as long:  # one that is read in parts
+                long.setattr("tactile_lab.store.signal.AT_ONCE", 2)
+                parts = run.signal("V_C1").trace(cells=cells)
+            for name in ("time", "low", "mean", "high", "gap"):
+                assert np.array_equal(getattr(parts, name), getattr(trace, name)), name
             edges = np.searchsorted(time, trace.time - 1e-9)
             assert edges[0] == 0 and (np.diff(edges) > 0).all()
             np.testing.assert_allclose(trace.low, np.minimum.reduceat(volts, edges))
