@@ -80,11 +80,7 @@ def no_text(what: str, port: str, asked: str, got: bytes) -> str:
 
 def lost(what: str, port: str, reason: Exception) -> str:
     """The port failed while it was open, as `pyserial` or the system said."""
-    text = str(reason)
-    stated = re.search(r"\[Errno (\d+)\]", text)
-    number = getattr(reason, "errno", None) or (
-        int(stated[1]) if stated else next(iter(_numbers(reason)), None)
-    )
+    text, number = str(reason), system_number(reason)
     if number in _RESET or _CLOSED.search(text):
         why = "the far end has closed the connection"
         then = (
@@ -116,9 +112,14 @@ def gathered(trouble: Sequence[str]) -> str:
     return " | ".join(f"{', '.join(which)}: {why}" for why, which in steps.items())
 
 
-def _numbers(reason: Exception) -> list[int]:
-    """The system's number in what `termios` raises, which has no `errno`."""
-    return [one for one in reason.args[:1] if isinstance(one, int)]
+def system_number(reason: Exception) -> int | None:
+    """The system's number of an error that `pyserial` or `termios` raised."""
+    number = getattr(reason, "errno", None)
+    if number is None and (stated := re.search(r"\[Errno (\d+)\]", str(reason))):
+        number = int(stated[1])
+    if number is None and reason.args and isinstance(reason.args[0], int):
+        number = reason.args[0]  # what `termios` raises has no `errno`
+    return number
 
 
 def _is_network(port: str) -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 import serial
 from serial.urlhandler import protocol_socket
 
+from drivers.serial_line.failures import system_number
 from tactile_lab.errors import InstrumentError, NotFoundError
 from tactile_lab.instruments.serial_dialect import SerialSettings
 
@@ -108,7 +109,7 @@ def release(port: serial.Serial, *, unsent: bool = False) -> None:
 
 
 def _told(port: str, what: str, reason: Exception) -> InstrumentError:
-    number = getattr(reason, "errno", None)
+    number = system_number(reason)
     # with a number pyserial tells port and reason twice
     why = str(reason) if number is None else os.strerror(number)
     start = f"The {what} at {port} cannot be opened ({why})."
@@ -118,6 +119,11 @@ def _told(port: str, what: str, reason: Exception) -> InstrumentError:
         return NotFoundError(
             f"{start} You may not use the port; on Linux join the group dialout "
             "(sudo usermod -aG dialout $USER) and log in again."
+        )
+    if port.startswith("socket:"):
+        return NotFoundError(
+            f"{start} Check that it is switched on and in this network, and that the "
+            "bench file names its address and the port of its text commands."
         )
     return NotFoundError(
         f"{start} Check that it is plugged in and that the bench file names its "

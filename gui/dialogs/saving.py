@@ -27,6 +27,7 @@ from gui.session.log import Severity
 from gui.setup.parameter import FieldError
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import RecordingError, TactileLabError
+from tactile_lab.store.folder import refuse_own
 from tactile_lab.trace import Trace
 from tactile_lab.whole_file import failing_as, replacing, write_text
 
@@ -55,6 +56,7 @@ def save_scene(panels: Panels) -> None:
 def write_scene(panels: Panels, path: Path) -> None:
     """Write the form as a scene."""
     with _telling(panels, "scene", path):
+        refuse_own(path)
         write_text(path, panels.setup.request().load().to_toml())
 
 

@@ -90,9 +90,11 @@ def command(
 def _of_run(run: Path, form: str, out: Path | None, selection: Selection) -> list[Path]:
     from tactile_lab.neuro.of_run import events_of
     from tactile_lab.quantity import bytes_text
+    from tactile_lab.store.folder import refuse_own
     from tactile_lab.store.run import Run
 
     target = out or run / FORMATS[form].beside(run.resolve().name)
+    refuse_own(target)
     with Run.load(run) as loaded:
         selection.check(loaded)
         module = of_whole_run(form)

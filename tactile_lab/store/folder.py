@@ -32,8 +32,29 @@ DATA, LOG, SCENE, REPORT = "data.h5", "log.jsonl", "scene.toml", "report.html"
 INPUTS = "inputs"
 """Folder within a run for copies of what it was made from."""
 
+OWN = frozenset(
+    (INFO, DATA, LOG, SCENE, "data.killed.h5", "ledger.bin", "remarks.json")
+)
+"""Files that a run is made of: nothing makes them again."""
+
 RESERVE = 200_000_000
 """Bytes that must stay free on the disk while a run is written."""
+
+
+def refuse_own(file: Path) -> None:
+    """Refuse to put an export in the place of what a run is made of.
+
+    Raises:
+        RecordingError: `file` is that, of any run.
+    """
+    found = file.resolve()
+    copied = found.parent.name == INPUTS
+    run = found.parent.parent if copied else found.parent
+    if (run / INFO).exists() and (copied or found.name in OWN):
+        raise RecordingError(
+            f"{file} is what the run {run.name} is made of; nothing else may take its "
+            "place. Give another name."
+        )
 
 
 class RunFolder:

@@ -71,10 +71,14 @@ class Selection:
         """Samples averaged into one.
 
         Raises:
-            RunFolderError: a rate above the run's.
+            RunFolderError: a rate above the run's, or not above 0.
         """
         if self.rate is None:
             return 1
+        if self.rate <= 0:
+            raise RunFolderError(
+                f"A rate of {self.rate:g} S/s holds nothing; give one above 0 S/s."
+            )
         count = round(1.0 / (self.rate * interval))
         if count < 1:
             raise RunFolderError(

@@ -114,6 +114,19 @@ def test_export_writes_beside_the_data(run):
     wrong = tell("export", run, "--to", "csv", "--from", "1 V")
     assert wrong.exit_code == 2
     assert "--from: " in wrong.output and "unit V" in wrong.output
+    none = tell("export", run, "--to", "csv", "--rate", "0 S/s")
+    assert none.exit_code == 2 and "above 0 S/s" in none.output
+
+
+@pytest.mark.parametrize("file", ["data.h5", "run.json", "inputs/pulses.py"])
+def test_no_export_takes_the_place_of_what_a_run_is_made_of(run, file):
+    """`--to mat --out RUN/data.h5` did: the samples were gone."""
+    before = {f: f.read_bytes() for f in run.rglob("*") if f.is_file()}
+    for to, beside in (("mat", run), ("neo", run), ("mat", run.parent / "x" / "..")):
+        out = beside / file if beside == run else beside / run.name / file
+        refused = tell("export", run, "--to", to, "--out", out)
+        assert refused.exit_code == 2 and "Give another name" in refused.output
+    assert {f: f.read_bytes() for f in run.rglob("*") if f.is_file()} == before
 
 
 def test_a_trial_that_the_run_ended_before_is_not_said_to_end_before_it_begins(run):

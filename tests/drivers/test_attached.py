@@ -1,6 +1,7 @@
 """What is attached, against served instruments."""
 
 import re
+import socket
 from importlib import resources
 
 import pytest
@@ -41,6 +42,14 @@ def test_a_port_that_is_not_there():
     (found,) = attached(ports=["/dev/ttyUSB77"])
     assert found["identity"] is None and "plugged in" in found["problem"]
     assert "cannot be opened (No such file or directory)." in found["problem"]
+
+
+def test_an_address_at_which_nobody_listens():
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        address = f"socket://127.0.0.1:{free.getsockname()[1]}"
+    (found,) = attached(ports=[address])
+    assert "cannot be opened (Connection refused)." in found["problem"]
+    assert "in this network" in found["problem"]
 
 
 def test_silence_is_told(served):

@@ -140,6 +140,9 @@ def test_view_is_exported(lab) -> None:
             write_scene(window.panels, folder / "saved.toml")
         assert "not saved" in window.session.log.lines[-1].text
         assert file.read_bytes() == before[file]
+    (folder / "run.json").write_text("{}")  # as beside a run
+    write_scene(window.panels, folder / "scene.toml")
+    assert "is made of" in notice.text() and not (folder / "scene.toml").exists()
     header = (folder / "view.csv").read_text().splitlines()[1]
     assert "V_C1_time_s" in header and "force_mean_N" in header
     assert 'name = "pulses"' in (folder / "saved.toml").read_text()
