@@ -29,9 +29,12 @@ def command(key: str, root: Path, where: str, out: Path | None, as_json: bool) -
     whether it drifts, and mean and standard error of each sensor.
     """
     with refusing():
+        from tactile_lab.errors import ParameterError
         from tactile_lab.report.over_runs import OverRuns, RunValue
         from tactile_lab.store.catalogue import Catalogue
 
+        if out is not None and out.suffix.lower() != ".html":
+            raise ParameterError(f"--out {out}: end the page's name in .html.")
         points, unit = [], ""
         with Catalogue(root) as listed:
             entries = listed.runs(where=where)

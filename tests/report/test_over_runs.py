@@ -74,5 +74,10 @@ def test_from_run_folders_to_a_page(tmp_path):
     assert done.exit_code == 0, done.output
     assert "Usual is" in done.output and "S1" in done.output
     assert "<svg" in page.read_text() and "Shewhart" in page.read_text()
+    info = folder.path / "run.json"  # the page took its place
+    before = info.read_bytes()
+    refused = CliRunner().invoke(cli, [*asked, "--out", str(info)])
+    assert refused.exit_code == 2 and "in .html" in refused.output
+    assert info.read_bytes() == before
     wrong = CliRunner().invoke(cli, ["chart", "rest", str(tmp_path)])
     assert wrong.exit_code == 2 and "runs --keys" in wrong.output
