@@ -18,6 +18,7 @@ import os
 import subprocess
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -33,6 +34,9 @@ RUN = "{run}"
 
 LONGEST = 3600.0
 """Time that a program after a run may take, s: a night's sequence waits for it."""
+
+NICENESS = 10
+"""Of programs that follow a run."""
 
 LAST_WORDS = 300
 """Bytes of what it printed that are told where it fails."""
@@ -93,19 +97,37 @@ class Lab:
         # a file: a pipe would be waited for as long as any child of it holds it
         with TemporaryFile() as said:
             try:
-                done = subprocess.run(
+                with subprocess.Popen(
                     words, stdin=subprocess.DEVNULL, stdout=said,
-                    stderr=subprocess.STDOUT, check=False, timeout=LONGEST,
-                )  # fmt: skip
+                    stderr=subprocess.STDOUT,
+                ) as called:  # fmt: skip
+                    stand_back(called)
+                    _wait_for(called)
             except OSError as reason:
                 return f"after_run: {words[0]} cannot be started: {reason.strerror}."
             except subprocess.TimeoutExpired:
                 return f"{told} did not end within {LONGEST / 60:g} min and was ended."
-            if done.returncode == 0:
+            if called.returncode == 0:
                 return ""
             said.seek(max(0, said.seek(0, os.SEEK_END) - LAST_WORDS))
             last = said.read().decode(errors="replace").strip()
-        return f"{told} ended with {done.returncode}: {last}"
+        return f"{told} ended with {called.returncode}: {last}"
+
+
+def stand_back(program: subprocess.Popen[Any]) -> None:
+    """Have a program that follows a run come after whatever runs a bench meanwhile."""
+    if hasattr(os, "setpriority"):
+        with suppress(OSError):  # it may stand farther back already
+            os.setpriority(os.PRIO_PROCESS, program.pid, NICENESS)
+
+
+def _wait_for(called: subprocess.Popen[bytes]) -> None:
+    """Wait for its end, at most `LONGEST` s, after which it is ended."""
+    try:
+        called.wait(LONGEST)
+    except BaseException:
+        called.kill()
+        raise
 
 
 def config_file() -> Path:

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import math
-import os
 import subprocess
 import sys
 import threading
@@ -19,10 +18,9 @@ from typing import TYPE_CHECKING
 
 from tactile_lab.engine.engine import Engine
 from tactile_lab.engine.events import ModelPart
-from tactile_lab.engine.process import BEHIND, take_place
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import RecordingError, RefusedError, TactileLabError
-from tactile_lab.lab import lab
+from tactile_lab.lab import lab, stand_back
 from tactile_lab.quantity import count
 
 if TYPE_CHECKING:
@@ -235,8 +233,7 @@ def write_report(engine: Engine, folder: Path) -> None:
         writing = subprocess.Popen(
             asked, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
         )
-        if hasattr(os, "setpriority"):
-            os.setpriority(os.PRIO_PROCESS, writing.pid, 10)
+        stand_back(writing)
         _, said = writing.communicate(timeout=LONGEST)
     except subprocess.TimeoutExpired as error:
         raise RecordingError(
@@ -256,7 +253,6 @@ def follow_run(engine: Engine, folder: Path) -> str:
     Raises:
         SceneError: the lab's file cannot be read.
     """
-    take_place(BEHIND)  # of the thread of this question
     return lab().follow(folder)
 
 

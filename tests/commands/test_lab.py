@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tactile_lab.errors import SceneError
-from tactile_lab.lab import config_file, lab
+from tactile_lab.lab import NICENESS, config_file, lab
 from tactile_lab.scene.load import load
 
 SHORT = ("--set", "protocol.hold=0.3 s", "--set", 'protocol.levels=["50 mN"]')
@@ -127,9 +127,11 @@ def test_what_follows_a_run_holds_up_nothing(set_by_lab, monkeypatch, tmp_path):
     set_by_lab('after_run = ["sleep", "600", "{run}"]\n')
     told = lab().follow(Path("0"))
     assert "did not end within" in told
-    monkeypatch.undo()
+    monkeypatch.setattr("tactile_lab.lab.LONGEST", 30.0)
 
-    left = '["sh", "-c", "sleep 60 & echo $! gone; exit 3"]'
+    # nor does it take the processor from the next one
+    behind = f"until [ $(nice) = {NICENESS} ]; do :; done"
+    left = f'["sh", "-c", "{behind}; sleep 60 & echo $! gone; exit 3"]'
     (tmp_path / "left.toml").write_text(f"after_run = {left}\n")
     monkeypatch.setenv("TACTILE_LAB_CONFIG", str(tmp_path / "left.toml"))
     told = lab().follow(tmp_path)
