@@ -169,8 +169,9 @@ def _x_axis(axes: Axes, plot: Plot, factor: float) -> None:
     elif not plot.x_log:
         few = 10 if not plot.beside else 6
         axes.xaxis.set_major_locator(MaxNLocator(few, steps=[1, 2, 5, 10]))
-    if plot.x_limits is not None:
-        axes.set_xlim(factor * plot.x_limits[0], factor * plot.x_limits[1])
+    first, last = plot.x_limits or (0.0, 0.0)
+    if first < last:  # a run may have ended at once
+        axes.set_xlim(factor * first, factor * last)
 
 
 def _log_x(axes: Axes) -> None:
