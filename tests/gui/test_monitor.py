@@ -17,14 +17,14 @@ def test_monitor_shows_the_distance_to_threshold_with_the_coil_off(lab) -> None:
     assert session.state is WindowState.READY
     assert window.header.stop.truth is CoilKnowledge.OFF
     session.out.mkdir(exist_ok=True)
-    before = set(session.out.iterdir())
+    before = set(session.out.glob("*/"))
     window.setup.run.click()
     lab.until(lambda: session.state is WindowState.RUNNING)
     lab.until(lambda: tools.twin.isEnabled() and tools.residual.isEnabled())
     assert not session.monitor.alive, "the scope is handed over before the run"
     lab.until(lambda: session.state in (WindowState.READY, WindowState.FAULT))
     lab.until(lambda: not (tools.follow.isEnabled() or tools.freeze.isEnabled()))
-    new = set(session.out.iterdir()) - before
+    new = set(session.out.glob("*/")) - before
     assert len(new) == 1, "watching keeps nothing"
 
 
