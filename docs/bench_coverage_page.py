@@ -129,23 +129,19 @@ noise smooths (V_GS of `wiring_check`, which says that its numbers are bounds). 
 field's band is of those that came from saturation, as both fields told here do: these
 lie at the edge of the core's loop.
 
-`identify` told its numbers too widely at 18db23b (98.3 to 98.6 % with the shunt; V_GS
-and I_bias 97.5 and 97.8 % without), since a spike that is seen late makes one interval
-longer and the next one shorter, and the two were taken to err by themselves: what they
-told scattered by a fifth of the variance that was said. Neighbours now tell how much of
-the scatter is of this kind. Two errors hid behind that, and were mended with it: V_C2
-was integrated across steps of the force (0.1 mV where a spike tells 0.01 mV), and the
-set-point was recorded as asked for, where the source takes 10 uA at a time. The phase
-at 0.8 Hz was too wide for the 0.5 ms of a bin by which edges of the current were dated;
-they are dated by how well they agree now, about 30 us. With the shunt that dating was
-mended once more, by 28 us (c9b0bc4), before the thousand runs above.
+What the intervals hold beyond noise: a spike that is seen late makes one interval
+longer and the next one shorter, and neighbours tell how much of the scatter is of this
+kind (`identify`); edges of the current are dated by how well they agree, about 30 us,
+or where the shunt does not show them by the steps next to them; the tau of `bipolar` is
+taken at both ends of the channel's offset, with 1 % of R1 and R2, of which R1 alone is
+drawn here.
 
 Of each row that names two commits, 30 seeds or more were run again at the later one.
 They told the same numbers, within 0.2 % of an interval's half-width, but for the phases
-of `sine_sweep`, which the 28 us moved by up to 12 % of theirs. Of the rows that name
-8753ae5, whose runs are not kept, the first 300 seeds were run again at 868b3b5 and held
-in 95.2 to 96.0 %. 30 of `wiring_check` told the same offset and gain there, with bands
-up to 0.3 % wider.
+of `sine_sweep`, which moved by up to 12 % of theirs as edges were dated anew (c9b0bc4).
+Of the rows that name 8753ae5, whose runs are not kept, the first 300 seeds were run
+again at 868b3b5 and held in 95.2 to 96.0 %. 30 of `wiring_check` told the same offset
+and gain there, with bands up to 0.3 % wider.
 
 "One number repeated" is no evidence of coverage, however many runs gave it. Offset and
 gain of `wiring_check` are such: the probes on 0 V and V_S pass by all that is drawn,
@@ -158,26 +154,8 @@ the force, and that alone decides: of the first thousand seeds 945 drew a force 
 its band, so they hold in 94.5 % whatever is done here. Numbers of one run hold or miss
 together.
 
-The tau of `bipolar` held in 93.6 and 92.5 % of a thousand runs at ebc8e8a. It follows
-an offset of V_C1 ever faster one way, and half of its interval was taken from the
-other; and R1 was drawn and stood in no interval. It is now taken at both ends, with 1 %
-of R1 and R2, of which R1 alone is drawn here. The converter's steps stood twice in a
-change of I_DS, before the push and in the hold, whose steps the fit has averaged: these
-held in 96.8 to 97.2 %.
-
 On this bench the source answers as steadily as its wire. Where answers scatter, a step
 that no shunt dates may have come earlier by what its round trip took longer than the
-quickest, which is in `identify`'s intervals since 8e058e9: without the shunt, answers
-late by 0 to 8 ms, evenly, each by itself, V_GS, tau and I_bias held in 22 of 24 runs;
-before, V_GS in 3 of 6.
-
-Two rows stood open until they were looked into. The phase at 0.05 Hz held in 35 %:
-for 70 ms after a frequency begins the coil is still on its ramp, and the fit took that
-for a transient of the film; it now begins when the force is on its sine. Then it held
-in 92.0 % of 776: the source steps too little in so slow a sine for the shunt to show
-it, and its steps were dated by those of the fast one 40 s later, by when the clocks had
-parted by 0.8 ms for each 20 ppm. They are dated by the steps next to them now. The
-scale of force of `rate_force` held in 81 %, by a fault of this campaign: it read the
-true scale off the force while that still rose, so that a lag counted as an error of the
-fit.
+quickest, which is in `identify`'s intervals: without the shunt, answers late by 0 to
+8 ms, evenly, each by itself, V_GS, tau and I_bias held in 22 of 24 runs (8e058e9).
 """
