@@ -107,7 +107,7 @@ PAGES = {
 }
 """What each page measures: if that has changed since, it may be out of date. A page of
 figures that is not listed is taken to measure everything."""
-HASH = r"\b(?=[0-9a-f]*[0-9])(?=[0-9a-f]*[a-f])[0-9a-f]{7}\b"
+HASH = r"\b(?=[0-9a-f]*[0-9])(?=[0-9a-f]*[a-f])[0-9a-f]{7,12}\b"
 
 
 def since(version: str, paths: str) -> str:
