@@ -41,17 +41,18 @@ PARTS = (
     ),
 )  # fmt: skip
 GOALS = """\
-A frame is a poll and the painting it causes, in the window's own thread: every 33 ms, and
-less often, at least ten times a second, where that thread would take more than 30 % of a
-core ([why](decisions/frames-within-a-budget.md)). Asked for: median at most 16 ms or
-idle + 8 ms, p99 at most 33 ms or 1.3 times that of idle (12 and 22 ms in a run in real
-time with seven lanes), gaps under 100 ms, at most 35 % of a core in a run, a usable window
-within 2 s, READY within 2.7 s, STOP to verified off within 0.3 s on a source that answers
-in 5 ms ([beside other programs](decisions/stop-on-a-busy-computer.md) later), flat memory,
-and at most 300 MB of all processes together after an hour of runs.
+A frame is a poll and the painting it causes, in the window's own thread: every 33 ms,
+and less often, at least ten times a second, where that thread would take more than 30 %
+of a core ([why](decisions/frames-within-a-budget.md)). Asked for: median at most 16 ms
+or idle + 8 ms, p99 at most 33 ms or 1.3 times that of idle (12 and 22 ms in a run in
+real time with seven lanes), gaps under 100 ms, at most 35 % of a core in a run, a
+usable window within 2 s, READY within 2.7 s, STOP to verified off within 0.3 s on a
+source that answers in 5 ms ([beside other
+programs](decisions/stop-on-a-busy-computer.md) later), flat memory, and at most 300 MB
+of all processes together after an hour of runs.
 
-Times are of the hour they were taken in: the same code on the same quiet cores has taken
-1.5 times as long 40 minutes earlier.
+Times are of the hour they were taken in: the same code on the same quiet cores has
+taken 1.5 times as long 40 minutes earlier.
 """
 
 
