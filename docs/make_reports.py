@@ -1,8 +1,8 @@
 """Measure again what docs/ states: every campaign, one after another.
 
 ``make reports`` runs this. It first says how long that takes, does only what is not
-done yet at this commit, and so goes on where it was stopped; the long campaigns among
-them keep their own rows too. Words choose those whose names contain one of them:
+done yet at this commit, and so goes on where it was stopped; one that fails keeps none
+of the others back, and is named in the end. The long campaigns keep their own rows too. Words choose those whose names contain one of them:
 ``.venv/bin/python docs/make_reports.py paper plan``. ``--pages`` measures nothing: it
 lists each page with the commits it was measured at, and how many commits have changed
 the code it measures since.
@@ -138,11 +138,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("words", nargs="*", help=f"of these: {', '.join(STEPS)}")
     parser.add_argument("--pages", action="store_true", help="measure nothing")
-    asked = parser.parse_args()
-    if asked.pages:
+    options = parser.parse_args()
+    if options.pages:
         print(pages())
         return
-    version, words = commit(), asked.words
+    version, words = commit(), options.words
     for word in words:
         if not any(word in name for name in STEPS):
             parser.error(f"no campaign's name has {word!r} in it")
@@ -159,14 +159,20 @@ def main() -> None:
     minutes = {n: known.get(n, {}).get("minutes", STEPS[n][0]) for n in left}
     told = ", ".join(f"{name} {minutes[name]:.0f}" for name in left)
     print(f"{sum(minutes.values()):.0f} minutes left: {told or 'nothing'}")
+    failed = []
     for name in left:
         print(f"{name} ...", flush=True)
         began = time.monotonic()
-        subprocess.run([sys.executable, *STEPS[name][1].split()], cwd=ROOT, check=True)
+        asked = [sys.executable, *STEPS[name][1].split()]
+        if subprocess.run(asked, cwd=ROOT, check=False).returncode:
+            failed.append(name)
+            continue
         took = (time.monotonic() - began) / 60
         known[name] = {"commit": version, "minutes": took}
         DONE.parent.mkdir(exist_ok=True)
         DONE.write_text(json.dumps(known, indent=1), encoding="utf-8")
+    if failed:
+        sys.exit(f"ended with an error, or missed a goal: {', '.join(failed)}")
 
 
 if __name__ == "__main__":
