@@ -2,7 +2,8 @@
 
 ``make reports`` runs this. It first says how long that takes, does only what is not
 done yet at this commit, and so goes on where it was stopped; one that fails keeps none
-of the others back, and is named in the end. The long campaigns keep their own rows too. Words choose those whose names contain one of them:
+of the others back, and is named in the end. The long campaigns keep their own rows too.
+Words choose those whose names contain one of them:
 ``.venv/bin/python docs/make_reports.py paper plan``. ``--pages`` measures nothing: it
 lists each page with the commits it was measured at, and how many commits have changed
 the code it measures since.
