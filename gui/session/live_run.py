@@ -92,6 +92,8 @@ class LiveRun(LiveTask):
         self.agreement: Agreement | None = None
         self.notes: dict[str, str] = {}
         self.waiting: list[str] = []
+        self._early: list[str] = []
+        """Notes given to a run that has not begun, and may be refused."""
         self.reports = True
         self.reporting: dict[Path, Callable[[], None]] = {}
         """And what follows once it is there."""
@@ -115,15 +117,17 @@ class LiveRun(LiveTask):
         self.title = self.name = title
         notes = dict(self.notes)
         self._begin(begin_run, request, self.out, notes, publish=self.publish)
-        waiting, self.waiting = self.waiting, []
-        for text in waiting:
+        self._early, self.waiting = self.waiting, []
+        for text in self._early:
             self.say(note, text, None)
 
     def note(self, text: str) -> None:
         """Keep a note with the run, stamped with its time; or with the next."""
         if self.alive:
             self.say(note, text, self.elapsed)
-            if self.source is not None:
+            if self.source is None:
+                self._early.append(text)
+            else:
                 self.source.notes.append((self.elapsed, text))
         else:
             self.waiting.append(text)
@@ -193,6 +197,8 @@ class LiveRun(LiveTask):
         self.asked = None
         if self.source is not None:
             self.source.running = False
+        self.waiting += self._early
+        self._early = []
         if ending.state is events.RunState.REFUSED:
             self.name = ""
             words = ("The run was refused.", ending.reason or "")
@@ -309,6 +315,7 @@ class LiveRun(LiveTask):
 
     def _has_begun(self, event: Begun) -> None:
         plan, coil = self.expectation, self._status.coil
+        self._early = []
         if event.folder is not None:
             self.folder, self.name = event.folder, event.folder.name
             self._log.add(Severity.INFO, "store", f"Recording to {event.folder}")

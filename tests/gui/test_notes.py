@@ -55,6 +55,25 @@ def test_a_note_before_a_run_goes_to_that_run(lab) -> None:
     assert lab.session.run.waiting == []
 
 
+def test_a_note_outlives_a_run_that_is_refused(lab, monkeypatch) -> None:
+    session = lab.session
+    lab.window.screen_.leave_run()
+    session.source = None
+    type_note(lab, "the film is wet")
+    nowhere = lab.folder / "a file"
+    nowhere.write_text("no folder")
+    monkeypatch.setattr(session.run, "out", nowhere)
+    lab.window.setup.run.click()
+    type_note(lab, "and the magnet moved")
+    lab.until(lambda: session.state is WindowState.FAULT)
+    monkeypatch.undo()
+    assert session.run.waiting == ["the film is wet", "and the magnet moved"]
+    lab.window.banner.acknowledge.click()
+    lab.until(lambda: session.state is WindowState.READY)
+    texts = [n.text for n in read_remarks(lab.complete_run()).notes]
+    assert texts == ["the film is wet", "and the magnet moved"]
+
+
 def test_a_note_beside_an_old_run_is_kept_with_that_run(lab) -> None:
     window, folder = lab.window, lab.runs(1)[0]
     window.screen_.open_run(folder)
