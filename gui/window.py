@@ -224,18 +224,7 @@ class Window(QMainWindow):
         if self.session.state is not WindowState.FAULT:
             self.close()
         else:
-            self.closing.say(
-                "COIL STATE UNKNOWN"
-                if self._unknown()
-                else "The run ended with a fault",
-                "Read the banner above, look at the source, then close the window.",
-            )
-            self.closing.stop.setEnabled(True)
-            self.closing.hide()
-
-    def _unknown(self) -> bool:
-        coil = self.session.coil_view()
-        return coil is not None and coil.verified_off is not True
+            self.closing.hide()  # the banner has to be read
 
     def _off_late(self) -> None:
         if self._leaving and self.session.busy:

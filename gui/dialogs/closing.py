@@ -52,6 +52,8 @@ class Closing(Overlay):
                 "the data so far as an <i>aborted</i> run."
             )
             self.keep.setText("Keep running")
+        self.keep.show()
+        self.stop.setEnabled(True)
         self.open()
         self._asking = True
         self.render_snapshot(snapshot, busy=True)

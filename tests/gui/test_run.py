@@ -195,6 +195,17 @@ def test_closing_while_running_asks_and_keeps_running_by_default(lab) -> None:
     assert window.isVisible()
 
 
+def test_closing_can_be_declined_after_a_fault_on_closing(lab) -> None:
+    window = lab.window
+    lab.run()
+    window.closing.say("Stopping", "as while the window leaves")
+    window.closing.hide()  # as a fault leaves it
+    assert not window.close()
+    assert window.closing.keep.isVisible() and window.closing.keep.hasFocus()
+    assert window.closing.stop.isEnabled()
+    window.closing.keep.click()
+
+
 def test_pauses_are_none_of_the_steps_that_results_wait_for(lab, monkeypatch) -> None:
     window, run = lab.window, lab.session.run
     source = LiveSource(None, 1.0)
