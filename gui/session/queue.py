@@ -39,8 +39,9 @@ class Queue(QObject):
 
     Args:
         planner: who plans just now.
-        log: says why one was taken out.
-        free: whether the bench is free.
+        log: says why one was taken out, or does not start.
+        bench: that is connected; None where there is none.
+        free: whether that is free.
         running: whether a run is in progress, which the first one follows.
         start: starts a run.
 
@@ -56,13 +57,14 @@ class Queue(QObject):
         self,
         planner: Callable[[], Link],
         log: Log,
+        bench: Callable[[], str | None],
         free: Callable[[], bool],
         running: Callable[[], bool],
         start: Callable[[Queued], None],
     ) -> None:
         super().__init__()
         self._planner, self._log, self._running = planner, log, running
-        self._free, self._start = free, start
+        self._bench, self._free, self._start = bench, free, start
         self.items: list[Queued] = []
         self.held = False
 
@@ -118,13 +120,25 @@ class Queue(QObject):
             self.changed.emit()
 
     def next(self) -> None:
-        """Start the first run, if it is planned and the bench is free."""
+        """Start the first run, if it is planned and its bench is connected and free."""
         planned = self.items and self.items[0].expectation is not None
         if planned and not self.held and self._free():
+            if self.items[0].request.bench != self._bench():
+                self._hold_for_bench(self.items[0])
+                return
             item = self.items.pop(0)
             item.left = "has started with the parameters it had"
             self.changed.emit()
             self._start(item)
+
+    def _hold_for_bench(self, item: Queued) -> None:
+        """Hold: what the header names would not be what is driven."""
+        words = (
+            f"{item.title} was queued for {item.request.bench}, which is not connected."
+            " Connect that, or edit and save it for the bench that is."
+        )
+        self._log.add(Severity.ERROR, "queue", words)
+        self.hold()
 
     def _planned(self, item: Queued, asked: Request, reply: Reply[Expectation]) -> None:
         """The plan of a waiting run is there; one that cannot run is taken out."""

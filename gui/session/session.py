@@ -84,6 +84,7 @@ class Session(QObject):
         self.queue = Queue(
             lambda: self._planner,
             self.log,
+            lambda: self.bench.choice,
             lambda: self._free,
             lambda: self.run.alive or self.state.in_run,
             lambda item: self.start(item.request, item.title, item.expectation),

@@ -106,17 +106,21 @@ class Subject(QObject):
             self._usual = scene
 
     def request(self) -> Request:
-        """What the form asks for; of a queued run only the parameters are replaced.
+        """What the form asks for, on the connected bench.
+
+        What a queued run was asked beside its parameters stays, unless it was asked of
+        another bench.
 
         Raises:
             FieldError: a field cannot be used.
         """
         session = self._session
         texts = [*self._form.overrides(), *self._tables.overrides()]
-        if self.edited is None:
+        asked = None if self.edited is None else self.edited.request
+        if asked is None or asked.bench != session.bench.choice:
+            path = self.path if asked is None else asked.path
             overrides = (*texts, *session.bench.overrides)
-            return Request(self.path, overrides, session.bench.choice)
-        asked = self.edited.request
+            return Request(path, overrides, session.bench.choice)
         own = ("protocol.", *(f"{name}." for name in TITLES))
         rest = [text for text in asked.overrides if not text.startswith(own)]
         return Request(asked.path, (*texts, *rest), asked.bench)

@@ -1,5 +1,7 @@
 """The queue: what waits, what it costs, and what a STOP does to it."""
 
+from importlib import resources
+
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
@@ -12,6 +14,8 @@ from gui.state import WindowState
 from gui.tab_order import scroll
 from tactile_lab.engine.request import Request
 from tactile_lab.scene.load import load
+
+BUILT_IN = resources.files("tactile_lab.scene").joinpath("simulated_bench.toml")
 
 
 def busy(lab) -> None:
@@ -396,3 +400,27 @@ def test_a_stop_that_finds_its_run_just_over_begins_no_other(lab) -> None:
     lab.until(lambda: session.state is WindowState.READY)
     lab.until(lambda: session.link.idle)
     assert len(waiting(lab)) == 1 and session.queue.held and not session.busy
+
+
+def test_a_queued_run_begins_on_the_bench_it_was_queued_for_alone(lab) -> None:
+    """Else the header would name one bench while another is driven."""
+    session, setup = lab.session, lab.window.setup
+    setup.buttons.queue.click()
+    (item,) = waiting(lab)
+    lab.until(lambda: item.expectation is not None)
+    other = lab.folder / "other.toml"
+    other.write_text(BUILT_IN.read_text(encoding="utf-8"), encoding="utf-8")
+    session.connect_bench(str(other))
+    lab.until(lambda: session.state is WindowState.READY)
+    setup.queue.resume.click()
+    assert not session.busy and waiting(lab) == [item] and session.queue.held
+    assert "queued for sim" in session.log.lines[-1].text
+    setup.edit(item)
+    lab.until(lambda: setup.buttons.save.isEnabled())
+    setup.save()
+    lab.until(lambda: item.request.bench == str(other))
+    setup.queue.resume.click()
+    assert session.busy and session.run.request.bench == str(other)
+    session.stop("enough")
+    lab.until(lambda: session.state is WindowState.READY)
+    session.connect_bench("sim")
