@@ -93,6 +93,7 @@ class Connect(Overlay):
         self.calibration.force_asked.connect(self._prepare_force)
         self.calibration.use_asked.connect(self._ask_and_use)
         session.status.changed.connect(self._follow)
+        session.stopped.connect(self._give_up)
         session.plan.arrived.connect(self._planned)
         session.run.trial_ended.connect(self._trial_ended)
         session.run.ended.connect(self._run_ended)
@@ -163,6 +164,11 @@ class Connect(Overlay):
     def _planned(self) -> None:
         if self._running and self.session.plan.problem:
             self._end(self.session.plan.problem)
+
+    def _give_up(self) -> None:
+        """STOP came before the run that a page asked for began."""
+        if self._running and not self.session.busy:
+            self._end("Stopped before it began.")
 
     def _trial_ended(self, outcome: object) -> None:
         source = self.session.source

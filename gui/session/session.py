@@ -61,6 +61,8 @@ class Session(QObject):
     """
 
     source_changed = Signal(object)
+    stopped = Signal()
+    """STOP was pressed: nothing that was asked for before it may begin."""
 
     def __init__(
         self, out: Path, *, separate: bool = True, realtime: bool = True
@@ -204,6 +206,7 @@ class Session(QObject):
         Runs that wait in the queue are held until somebody resumes it.
         """
         self._after_monitor = None
+        self.stopped.emit()
         if self.manual.alive:
             self.manual.stop(reason)
             self._log_stop(f"{reason}: coil off", Severity.WARNING)

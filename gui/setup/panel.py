@@ -113,6 +113,7 @@ class SetupPanel(QFrame):
         queue.resumed.connect(session.queue.resume)
         session.queue.changed.connect(self._show_queue)
         session.plan.arrived.connect(self._planned)
+        session.stopped.connect(self._wait_no_more)
 
     # --- scenes ---------------------------------------------------------------------
 
@@ -260,6 +261,11 @@ class SetupPanel(QFrame):
             self._once_planned = then
             return False
         return True
+
+    def _wait_no_more(self) -> None:
+        """STOP: what would begin once it is planned does not."""
+        if self._once_planned == self.start:
+            self._once_planned = None
 
     def _planned(self) -> None:
         expectation = self._session.plan.expectation

@@ -424,3 +424,17 @@ def test_a_queued_run_begins_on_the_bench_it_was_queued_for_alone(lab) -> None:
     session.stop("enough")
     lab.until(lambda: session.state is WindowState.READY)
     session.connect_bench("sim")
+
+
+def test_stop_forgets_a_run_that_waits_for_its_plan(lab) -> None:
+    """Of the monitor alone: else the bench is asked anew, and all of that forgotten."""
+    session, setup = lab.session, lab.window.setup
+    session.show_monitor(True)
+    lab.until(lambda: session.monitor.source is not None)
+    setup.start_when_planned()
+    session.stop("STOP")
+    lab.until(lambda: not session.monitor.alive)
+    setup.plan_now()
+    lab.until(lambda: session.plan.expectation is not None)
+    lab.app.processEvents()
+    assert not session.busy
