@@ -117,7 +117,7 @@ class Connect(Overlay):
         self.pages.setCurrentIndex(number)
 
     def save_to(self, path: Path) -> bool:
-        """Write the bench file and connect; whether it can be used."""
+        """Write the bench file and connect; whether both can be done."""
         choice = self.instruments.take()
         self.wiring.take()
         self.calibration.take()
@@ -127,11 +127,8 @@ class Connect(Overlay):
         except (TactileLabError, OSError) as error:
             self._say(str(error))
             return False
-        self._say("")
         self.session.log.add(Severity.GOOD, "bench", f"Saved {path}")
-        self.hide()
-        self.session.connect_bench(str(path))
-        return True
+        return self._connect_to(path, f"Saved {path}, and not connected. ")
 
     def use_calibration(self, calibration: Path, path: Path) -> bool:
         """Save the connected bench with a calibration, and connect to it."""
@@ -145,13 +142,12 @@ class Connect(Overlay):
         except TactileLabError as error:
             self._say(str(error))
             return False
-        self._say("")
-        self.session.log.add(
-            Severity.GOOD, "bench", f"Saved {path} with its calibration"
-        )
-        self.session.connect_bench(str(path))
+        said = f"Saved {path} with its calibration"
+        self.session.log.add(Severity.GOOD, "bench", said)
+        problem = self.session.connect_bench(str(path))
+        self._say(problem and f"{said}, and not connected. {problem}")
         self.show_bench()
-        return True
+        return not problem
 
     # --- the runs the pages ask for
 
@@ -266,9 +262,15 @@ class Connect(Overlay):
     def _ask_and_open(self) -> None:
         ask_file(self, "Open a bench file", self._connect_to, kinds=BENCHES)
 
-    def _connect_to(self, path: Path) -> None:
+    def _connect_to(self, path: Path, saved: str = "") -> bool:
+        """Connect to a bench file; whether that may be done now."""
+        problem = self.session.connect_bench(str(path))
+        if problem:
+            self._say(saved + problem)
+            return False
+        say(self.problem, "")
         self.hide()
-        self.session.connect_bench(str(path))
+        return True
 
     def _ask_and_use(self, calibration: Path | None) -> None:
         spec = self.session.bench.spec

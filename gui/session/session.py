@@ -108,15 +108,24 @@ class Session(QObject):
 
     # --- what the window asks for
 
-    def connect_bench(self, choice: str) -> None:
-        """Ask the instruments of a bench ("sim" or a bench file) who they are."""
-        idle = self.state in (WindowState.DISCONNECTED, WindowState.READY)
-        if idle and not self.manual.alive:
-            self.bench.connect_to(choice)
+    def connect_bench(self, choice: str) -> str:
+        """Ask the instruments of a bench who they are; why not, "" if they are asked.
+
+        Args:
+            choice: "sim" or a bench file.
+        """
+        if self.state is WindowState.FAULT:
+            return "Acknowledge the fault first."
+        if self.busy or self.state is WindowState.CONNECTING:
+            return "The connected bench is in use; connect this one once it is ready."
+        self.monitor.stop("another bench is connected")
+        self.bench.connect_to(choice)
+        return ""
 
     def disconnect_bench(self) -> None:
         """Let go of the bench."""
         if self._free:
+            self.monitor.stop("the bench is disconnected")
             self.bench.let_go()
             self.status.enter(WindowState.DISCONNECTED)
 

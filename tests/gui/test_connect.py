@@ -310,6 +310,18 @@ def test_absent_source_is_a_fault_and_then_no_bench(lab) -> None:
     assert window.centre.empty.isVisible()
 
 
+def test_a_bench_that_cannot_be_connected_now_is_saved_and_says_so(lab) -> None:
+    window, session = lab.window, lab.session
+    lab.run()
+    window.actions_.connect_dialog()
+    dialog = window.findChild(Connect)
+    file = lab.folder / "later.toml"
+    dialog.save_to(file)
+    assert file.exists() and session.bench.choice != str(file)
+    assert dialog.isVisible() and "is in use" in dialog.problem.text()
+    dialog.hide()
+
+
 @pytest.fixture
 def calibrating(lab) -> Iterator:
     """A short calibration in progress on a bench whose teslameter a person reads."""

@@ -52,3 +52,17 @@ def test_record_keeps_what_the_monitor_saw(lab) -> None:
     right = noise.mapTo(window, noise.signals.geometry().bottomRight()).x()
     tab = window.review.help
     assert right == tab.mapTo(window, tab.rect().bottomRight()).x()
+
+
+def test_what_watches_lets_go_of_a_bench_that_is_exchanged(lab) -> None:
+    session = lab.session
+    session.show_monitor(True)
+    lab.until(lambda: session.monitor.source is not None)
+    session.connect_bench("sim")
+    lab.until(lambda: not session.monitor.alive)
+    lab.until(lambda: session.state is WindowState.READY)
+    session.show_monitor(True)
+    lab.until(lambda: session.monitor.source is not None)
+    session.disconnect_bench()
+    lab.until(lambda: not session.monitor.alive)
+    assert session.state is WindowState.DISCONNECTED
