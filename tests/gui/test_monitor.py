@@ -7,6 +7,7 @@ from tactile_lab.store.run import Run
 def test_monitor_shows_the_distance_to_threshold_with_the_coil_off(lab) -> None:
     window, session = lab.window, lab.session
     window.centre.tools.monitor.click()
+    lab.until(lambda: session.monitor.source is not None)  # words may be of one before
     lab.until(lambda: "silent" in window.centre.monitor_bar.words)
     assert "mV" in window.centre.monitor_bar.words
     keys = [row.lane.key for row in window.centre.stack.visible_rows()]
