@@ -115,7 +115,7 @@ class Residuals:
             firing.take(part)
         if trace is None or seen is None:
             return firing.misses
-        return np.concatenate([trace.value - seen.value.mean(axis=1), firing.misses])
+        return np.concatenate([trace.value - trace.means(seen), firing.misses])
 
     def late(self, driven: DrivenCircuit) -> FloatArray:
         """What of V_C2 at firing a late spike changes, V/s, shape (pairs, 2).

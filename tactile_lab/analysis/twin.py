@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,9 +20,13 @@ from tactile_lab.model.simulate import ErrorEstimate
 from tactile_lab.model.slices import Samples, slices
 from tactile_lab.model.state import Start
 
-NARROW, WITHIN = 1e-3, 8
-"""A signal hardly bends within bins narrower than this, s; in others the model's mean
-is that of so many points."""
+NARROW = 1e-3
+"""A signal hardly bends within bins narrower than this, s."""
+LONGEST, MOST = 10e-3, 32
+"""In others the model's mean is that of parts, none longer than this, s: a vibration of
+100 Hz has one period in it. At most so many in a bin."""
+NODES, WEIGHTS = (found / 2 for found in np.polynomial.legendre.leggauss(8))
+"""Where in a part the model is asked, from its middle, and what each counts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +55,22 @@ class Measured:
         """Takes of the model, over `duration` s, what its mean in each bin is of."""
         if self.width < NARROW:
             return Samples(self.signal, self.time[:, None], duration)
-        within = ((np.arange(WITHIN) + 0.5) / WITHIN - 0.5) * self.width
+        parts = self._parts
+        middles = (np.arange(parts) + 0.5) / parts - 0.5
+        within = np.add.outer(middles, NODES / parts).ravel() * self.width
         at = np.clip(self.time[:, None] + within, 0.0, duration)
         return Samples(self.signal, at, duration)
+
+    def means(self, taken: Samples) -> FloatArray:
+        """Of the model in each bin, shape (n,), V, by what `samples` took."""
+        if self.width < NARROW:
+            return taken.value[:, 0]
+        parts = self._parts
+        return taken.value @ (np.tile(WEIGHTS, parts) / parts)
+
+    @property
+    def _parts(self) -> int:
+        return min(max(math.ceil(self.width / LONGEST), 1), MOST)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +194,7 @@ def twin(
         return _Seen(
             ErrorEstimate.largest(errors),
             np.concatenate(spikes) if "spikes" in keep else None,
-            [taken.value.mean(axis=1) for taken in samples],
+            [t.means(taken) for t, taken in zip(compared, samples, strict=True)],
         )
 
     found = seen(DrivenCircuit(circuit, force))
