@@ -49,6 +49,8 @@ class Belief:
         steps: shape (n, 2): from that time on, s, the source gives this current, A.
         doubt: shape (n,): how far each of them may lie on either side of where the
             others say, s.
+        begins: shape (k,), s: of lists, each of which may lie elsewhere within the
+            clocks' band, for the samples showed each by itself when it began.
         deviation: of all that, to be tried.
     """
 
@@ -61,6 +63,7 @@ class Belief:
     dated: bool = True
     steps: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
     doubt: FloatArray = field(default_factory=lambda: np.empty(0))
+    begins: FloatArray = field(default_factory=lambda: np.empty(0))
     deviation: Deviation = NOWHERE
 
     @cached_property

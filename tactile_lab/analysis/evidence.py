@@ -77,6 +77,12 @@ class Residuals:
         self.offset = 0.0 if V_C1 is None else math.hypot(V_C1.resolution, V_C1.offset)
         self.size = self.bins + self._earlier.size
 
+    @property
+    def times(self) -> FloatArray:
+        """Of each datum, shape (size,), s: the middle of a bin, or the later spike."""
+        bins = np.empty(0) if self._trace is None else self._trace.time
+        return np.concatenate([bins, self._later])
+
     def circuit(self, x: FloatArray) -> Circuit:
         """The circuit at scaled parameters `x`, 0 where the start lies."""
         changed: dict[str, Any] = {}

@@ -270,6 +270,21 @@ class _Trial:
             shifted = np.zeros(problem.size)
             shifted[:bins] = problem.offset * self._scale[:bins]
             self._bands.append(("offset", shifted))
+        self._bands += self._lists()
+
+    def _lists(self) -> list[tuple[str, FloatArray]]:
+        """What it does that each list may have begun elsewhere than the others.
+
+        By then the force was 0 again, so what the clocks do within a list is all.
+        """
+        bands = zip(self._belief.bands, self._bands, strict=False)
+        clocks = [change for (_, what, _), (_, change) in bands if what == "clock"]
+        played = np.searchsorted(self._belief.begins, self._problem.times)
+        return [
+            ("clocks", np.where(played == number, change, 0.0))
+            for change in clocks
+            for number in range(1, self._belief.begins.size + 1)
+        ]
 
     def about(self, belief: Belief, parts: FloatArray) -> _Trial:
         """The same about another belief, and `parts` of its bands."""

@@ -127,6 +127,7 @@ def _belief(run: Run, scene: Scene) -> Belief | None:
         dated=applied.uncertainty() is not None,
         steps=applied.steps,
         doubt=applied.doubt,
+        begins=run.trials["start"] if played(run) else np.empty(0),
     )
 
 

@@ -58,6 +58,32 @@ def test_clocks_far_apart_within_their_band_are_no_misfit():
     assert explain(believed, begin, spike_times=found.spike_times) is None
 
 
+def test_lists_that_each_began_a_little_off_are_no_misfit():
+    """Of each the shunt shows when it began, to half a millisecond, by itself."""
+    at = np.linspace(0.0, 1.0, 201)
+    grating = np.column_stack([0.1 + at, 0.16 - 0.1 * np.cos(2 * np.pi * 10 * at)])
+    scan = Waveform.through([(0, 0), *grating, (1.2, 0), (2.39, 0)])
+    begins = 0.5 + 2.4 * np.arange(4)
+    late = np.array([4e-4, -3e-4, 2e-4, 4e-4])
+    believed, true = (
+        Waveform(
+            np.concatenate([[0.0], *(scan.time + t for t in begins + off)]),
+            np.concatenate([[0.0], *(scan.value for _ in begins)]),
+        )
+        for off in (0.0, late)
+    )
+    belief = replace(BELIEF, setpoint=MAGNET.current_for(believed))
+    there = replace(BELIEF, setpoint=MAGNET.current_for(true))
+    found = simulate(there.circuit, there.force, keep=("V_C1", "spikes"))
+    time = (np.arange(2000) + 0.5) * found.duration / 2000
+    rng = np.random.default_rng(5)
+    volts = found.sample("V_C1", time) + rng.normal(0, 4e-4, time.size)
+    seen = Measured("V_C1", time, volts, resolution=16e-3, offset=3e-3)
+    data = {"V_C1": seen, "spike_times": found.spike_times}
+    assert explain(belief, found.duration, **data) is not None  # all off alike: no
+    assert explain(replace(belief, begins=begins), found.duration, **data) is None
+
+
 @pytest.mark.parametrize(
     ("name", "size"),
     [
