@@ -89,7 +89,8 @@ def _preview(made: Plan) -> Preview:
         if name == "V_K" and result.spike_times is not None:
             at = np.union1d(time, _around(result.spike_times, drive.duration))
         traces[name] = (at + BASELINE, result.sample(name, at))
-    spikes = none if result.spike_times is None else result.spike_times + BASELINE
+    spikes = none if result.spike_times is None else result.spike_times
+    spikes = spikes[drive.streams_at(spikes)] + BASELINE  # others nobody sees
     return Preview(force, traces, spikes, holds, length)
 
 

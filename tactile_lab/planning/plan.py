@@ -74,14 +74,19 @@ class Plan:
         return ways_instead(self.scene, self.timeline.steps)
 
     @cached_property
+    def spikes(self) -> int | None:
+        """Of the model, in what is streamed; None where the preview tells none."""
+        times = None if self.preview is None else self.preview.spike_times
+        return None if times is None else int(self.timeline.streams_at(times).sum())
+
+    @cached_property
     def computing(self) -> Computing:
         """Processor time and memory the run takes on this computer."""
-        spikes = None if self.preview is None else self.preview.spike_times
         return computing(
             self.scene,
             self.needs,
             self.timeline,
-            self.timeline.spikes if spikes is None else int(spikes.size),
+            self.timeline.spikes if self.spikes is None else self.spikes,
             self.estimate.update_interval,
         )
 
@@ -192,9 +197,8 @@ class Plan:
     def _preview(self) -> dict[str, Any] | None:
         if self.preview is None:
             return None
-        spikes = self.preview.spike_times
         return {
-            "spikes": None if spikes is None else int(spikes.size),
+            "spikes": self.spikes,
             "stages": dict(self.preview.stages),
             "left_out": list(self.preview.left_out),
             "error": {
@@ -329,7 +333,9 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
     for one in plan.ways_instead:
         yield f"{BY_WAY[one.way]} instead", str(one)
     if plan.preview is not None and plan.preview.spike_times is not None:
-        yield "spikes", f"{plan.preview.spike_times.size} by the model"
+        others = plan.preview.spike_times.size - (plan.spikes or 0)
+        unseen = f", {others} more while nothing is streamed" if others else ""
+        yield "spikes", f"{plan.spikes} by the model{unseen}"
     if carried := plan.carried_over:
         yield "carried over", carried
     if plan.preview is not None:

@@ -7,7 +7,9 @@ from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.current_list import CurrentList
 from tactile_lab.drive import Drive
 from tactile_lab.errors import LimitError, ParameterError, SceneError, TactileLabError
@@ -49,6 +51,15 @@ class Timeline:
     def streamed(self) -> float:
         """Time during which samples are taken, s: all but planned pauses."""
         return sum(step.trial.length for step in self.steps if not step.trial.pause)
+
+    def streams_at(self, time: FloatArray) -> NDArray[np.bool_]:
+        """Whether samples are taken then, in no pause and no list's loading; (n,)."""
+        found = np.zeros(time.size, dtype=np.bool_)
+        for step in self.steps:
+            if not step.trial.pause:
+                end = step.start + step.trial.length
+                found |= (time >= step.start) & (time < end)
+        return found
 
     @property
     def loading(self) -> float:

@@ -376,6 +376,16 @@ def test_no_error_of_spike_times_is_told_where_no_spike_is_expected():
     assert "spike times within" not in told and "V_C1 within" in told
 
 
+def test_spikes_while_nothing_is_streamed_are_told_apart():
+    """Demagnetising pushes the sensor too; a run finds no spike of that."""
+    planned = plan(load("hold_10s", ["protocol.demagnetise=true"]))
+    assert planned.spikes == plan(load("hold_10s")).spikes == 37
+    assert planned.to_dict()["preview"]["spikes"] == 37
+    others = planned.preview.spike_times.size - 37
+    assert others > 0
+    assert f"37 by the model, {others} more while nothing is streamed" in text(planned)
+
+
 def test_a_rate_that_node_a_does_not_need_is_told():
     """The same V_C1 at a hundredth of the disk; nothing is said where that is so."""
     (told,) = plan(load("v_c1_only", ["record.sample_rate=1 MS/s"])).suggestions
