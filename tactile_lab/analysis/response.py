@@ -16,6 +16,8 @@ HARMONICS = 6
 """So many harmonics of the answer are told apart from noise, with points enough."""
 NOT_YET = 3.0
 """A cause so many times further from its sine than later on is not yet on it."""
+MOST_BESSEL = 0.5819
+"""The Bessel function J1 nowhere exceeds this."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +58,8 @@ def gain(
         frequency: Hz.
         step_bias: how far means of the answer may be off by a converter's steps, in its
             unit (`tactile_lab.analysis.converter`). They move a sine's amplitude A by
-            2/pi b sqrt(step/A), b = step/pi where no noise smooths them (the first of a
-            sum of Bessel functions), and its phase not at all.
+            2 b J1(2 pi A/step) at most, about 2/pi b sqrt(step/A), b = step/pi where no
+            noise smooths them and the bias where some does, and its phase not at all.
         code: one step of that converter, in the answer's unit; what is left of the
             steps repeats with it and is no scatter either.
         leak: time constant with which a transient dies away, s; fitted if given.
@@ -109,8 +111,9 @@ def gain(
     error = scatter * math.sqrt(alike * float(np.sum(inverse[0] ** 2)))
     free = max(1, int(freedom / alike))
     size = max(abs(got), 1e-300)
-    first = 2 / math.pi * step_bias
-    codes = 2 / math.pi * first * min(1.0, math.sqrt(math.pi * first / size))
+    step = code or 2 * step_bias
+    first = min(step_bias, step / math.pi)
+    codes = 2 * first * min(MOST_BESSEL, math.sqrt(step / size) / math.pi)
     ratio = got / given
     return Gain(
         frequency,

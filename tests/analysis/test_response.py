@@ -39,6 +39,27 @@ def test_its_intervals_hold_under_harmonics_noise_and_converter_steps():
     assert found.gain.half < 0.12
 
 
+def test_steps_that_noise_smooths_in_part_stand_in_the_interval():
+    """A sine less than a code high, with noise of 0.3 codes: a sweep with a bias."""
+    rng, time, code, right, n = (
+        np.random.default_rng(6),
+        np.arange(0, 150, 0.1),
+        1.0,
+        0,
+        60,
+    )
+    wave = 2 * np.pi * 0.02 * time
+    for middle in rng.uniform(0, 1, n):
+        samples = (middle + 0.9 * np.sin(wave))[:, None] + rng.normal(
+            0, 0.3, (time.size, 100)
+        )
+        seen = (code * np.rint(samples / code)).mean(axis=1)
+        bias = step_bias(seen, code, 100)
+        found = gain(time, np.sin(wave), seen, 0.02, bias, code)
+        right += found.gain.low <= 0.9 <= found.gain.high
+    assert right >= 0.95 * n
+
+
 def test_steps_of_the_source_are_no_scatter():
     """A source that is set 22 times a second gives a sine in stairs."""
     steps = np.floor(TIME * 22) / 22
