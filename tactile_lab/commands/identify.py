@@ -65,7 +65,7 @@ def command(
     if as_json:
         alone = {name: one and answer(one) for name, one in found.alone.items()}
         told = answer(found.together) | {"warnings": list(found.warnings)}
-        print_json(told | ({"runs": alone} if len(alone) > 1 else {}))
+        print_json(told | {"runs": alone if len(alone) > 1 else None})
         return
     _print(found)
 

@@ -105,7 +105,7 @@ def describe(path: Path) -> dict[str, Any]:
                     "start_s": float(row["start"]),
                     "end_s": float(row["end"]),
                     "spikes": int(row["spikes"]) if searched else None,
-                    "complete": whole,
+                    "complete": bool(whole),
                 }
                 for row, whole in zip(trials, ended(trials), strict=True)
             ]

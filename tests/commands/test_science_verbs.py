@@ -69,6 +69,19 @@ def test_identify_finds_the_bench_s_own_parameters(run_folder):
     assert float(tau[1]) == pytest.approx(8.69, rel=0.1)
 
 
+def test_what_a_run_holds_is_shown_as_json(run_folder):
+    done = call("show", run_folder, "--json")
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    assert [trial["complete"] for trial in told["trials"]] == [True]
+    assert told["trials"][0]["level_N"] == 0.18
+
+
+def test_one_run_is_identified_with_all_keys(run_folder):
+    told = json.loads(call("identify", run_folder, "V_GS", "--json").stdout)
+    assert told["runs"] is None and told["parameters"]["V_GS"]["value"] > 1
+
+
 def test_identify_fits_several_runs_together(run_folder):
     other = run_folder.with_name("other")
     shutil.copytree(run_folder, other)
