@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from tactile_lab.planning.plan import plan
 from tactile_lab.planning.timeline import timeline
 from tactile_lab.plugins import protocol_names, scene_names
 from tactile_lab.scene.load import load
@@ -44,6 +45,12 @@ def test_the_force_ends_at_zero(name):
     last = planned.steps[-1].trial
     assert (last.current or last.force).value[-1] == pytest.approx(0.0, abs=1e-15)
     assert np.all(np.isfinite(planned.force.value))
+
+
+def test_no_scene_that_ships_is_sampled_too_slowly_for_its_spikes():
+    plans = [plan(load(name), preview=False) for name in scene_names()]
+    told = [line for planned in plans for line in planned.warnings]
+    assert not [line for line in told if "misses about" in line]
 
 
 def test_every_protocol_that_ships_has_a_scene():
