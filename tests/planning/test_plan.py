@@ -338,6 +338,9 @@ def test_a_search_is_foreseen_where_the_scene_has_its_bench_deviate():
     assert saved["model beside the run"].seconds == pytest.approx(left)
     assert "search for a cause" not in less.time
     assert "search for a cause" not in plan(load()).computing.time
+    for other in ("specimen=9", "hysteresis=50 mA"):
+        found = plan(load(None, [f"simulated.{other}"])).computing
+        assert "search for a cause" in found.time
 
 
 def test_a_drain_current_keeps_the_v_c1_that_it_is_derived_from():
