@@ -18,6 +18,8 @@ WITHIN = 0.5
 """A spike may lie off its expected place by this part of the interval around it."""
 SILENCE = 3.0
 """A gap so many times longer than the interval before begins a new burst."""
+ALONE = 1.0
+"""And so does one this long, s: V_C2 forgets within it what the spike before was."""
 FINEST = 0.001
 """An error of the rate below this tells nothing more, %."""
 
@@ -63,7 +65,8 @@ class Matched:
         drift enters; not a number without three spikes in a burst.
         """
         gaps = np.diff(self.measured)
-        begins = np.append(True, gaps > SILENCE * _interval(self.measured)[:-1])
+        silence = np.minimum(SILENCE * _interval(self.measured)[:-1], ALONE)
+        begins = np.append(True, gaps > silence)
         burst, at = np.cumsum(begins), np.arange(begins.size)
         inside = burst[2:] == burst[:-2]
         if not inside.any():

@@ -214,6 +214,13 @@ def test_what_noise_makes_of_intervals_adds_up_over_a_burst():
     assert np.median(told) == pytest.approx(np.percentile(lies, 95), rel=0.1)
 
 
+def test_single_spikes_of_presses_far_apart_tell_no_noise():
+    """A sensor that warms fires ever later: that is a drift, not noise."""
+    predicted = 0.4 + 45.0 * np.arange(8)
+    late = np.array([0.06, 0.09, 0.05, 0.1, 0.07, 0.11, 0.08, 0.09])
+    assert np.isnan(match(predicted + late, predicted).scatter)
+
+
 @given(TRAIN, st.data())
 def test_a_lost_spike_is_missed_and_a_false_one_is_extra(times, data):
     lost = data.draw(st.integers(0, times.size - 1))
