@@ -3,7 +3,7 @@
 Each part is so many seconds per million samples, set-points or trials, as measured on
 one computer (docs/plan-figures.md shows how near that comes over all scenes that ship),
 times how much slower this one is. That is told by a few milliseconds of plain Python,
-which is most of what a run does; how fast an array is sorted tells more of a processor's
+which is most of what a run does; how fast an array is sorted tells of a processor's
 widest registers.
 """
 
@@ -31,8 +31,8 @@ START, FITTED = 3.7, 0.95
 and the fits to them add where any are expected, s."""
 PER_TRIAL = 0.012
 """Played, judged and drawn, s."""
-PER_STREAMED_SECOND = 0.053
-"""Of blocks that are handed on, at any rate, s."""
+PER_STREAMED_SECOND, DRIVEN = 0.03, 0.023
+"""Of blocks that are handed on, at any rate, and of a source that is read back, s."""
 PER_HELD_SECOND = 5.8e-3
 """Of one source meter, which is read back in pauses too, s."""
 STORED, DETECTED = 0.006, 0.006
@@ -124,7 +124,7 @@ def computing(
         "start and report": (
             START + (FITTED if spikes else 0.0) + PER_TRIAL * len(drive.steps)
         ),
-        "streaming": PER_STREAMED_SECOND * drive.streamed,
+        "streaming": (PER_STREAMED_SECOND + DRIVEN * needed.coil) * drive.streamed,
         "source meters": PER_HELD_SECOND * drive.duration * len(needed.voltages),
         "storing": STORED * millions * len(needed.stored),
     }
