@@ -72,10 +72,12 @@ def places(
 def draw_across(
     painter: QPainter, frame: Frame, lines: Sequence[Across], ground: str
 ) -> None:
-    """Draw lines across, and their words over all lines.
+    """Draw the lines across that are in the lane, and their words over all lines.
 
     Words have a ground of its own colour: traces would strike them through.
     """
+    low, high = frame.top - OVER, frame.bottom + OVER
+    lines = [one for one in lines if low <= frame.y1(one.value) <= high]
     for one in lines:
         y = round(frame.y1(one.value)) + 0.5
         painter.setPen(paint.pen(one.colour, one.style))

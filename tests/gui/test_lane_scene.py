@@ -5,11 +5,12 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 from lane_stack import LEFT, box, drag, middle, move, settle, shown, span, wheel
-from PySide6.QtCore import QPoint, QPointF, QRect
+from PySide6.QtCore import QPoint, QPointF, QRect, Qt
+from PySide6.QtGui import QImage, QPainter
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from gui.lanes.across import places
+from gui.lanes.across import Across, draw_across, places
 from gui.lanes.box import heights_of
 from gui.lanes.expected import Stretch
 from gui.lanes.floor import AXIS, cursor_times, grounds, round_times
@@ -84,6 +85,20 @@ def test_no_round_time_stands_half_below_that_of_a_cursor(app, a, b):
     ]
     assert len(times) > 5 and 3 <= len(whole) < len(times)
     assert all(not left <= x <= right for x in whole for left, right in seen)
+
+
+def test_a_line_across_beyond_the_lane_leaves_no_half_of_its_words(app) -> None:
+    image = QImage(200, 40, QImage.Format.Format_RGB32)
+    image.fill(Qt.GlobalColor.white)
+    bare = image.copy()
+    painter, dots = QPainter(image), Qt.PenStyle.DotLine
+    frame = Frame(0, 200, 0, 40, 0, 1, -0.25, 0.25)
+    for value in (0.35, -0.35):
+        line = Across(value, "threshold", LIGHT.muted, dots, right=False)
+        draw_across(painter, frame, [line], LIGHT.plot)
+    painter.end()
+    assert image == bare
+
 
 
 @pytest.mark.parametrize("tall", [20.0, 34.0, 90.0])
