@@ -72,6 +72,8 @@ class Chips:
         """Lamp and words of an instrument that is not in use now."""
         if self._status.state is WindowState.CONNECTING:
             return Lamp.WAITING, "asking …"
+        if self._status.state is WindowState.ABORTING:  # which it may be the reason of
+            return Lamp.WAITING, "the run is being stopped"
         here = [one for one in self._bench.answers if one.role == role]
         if self._status.state is WindowState.DISCONNECTED or not here:
             return Lamp.ABSENT, "no device"

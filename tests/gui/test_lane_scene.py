@@ -100,7 +100,6 @@ def test_a_line_across_beyond_the_lane_leaves_no_half_of_its_words(app) -> None:
     assert image == bare
 
 
-
 @pytest.mark.parametrize("tall", [20.0, 34.0, 90.0])
 def test_words_of_lines_across_lie_in_the_lane_and_over_no_others(tall):
     high, widths = 16, (40.0, 110.0)

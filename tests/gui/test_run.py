@@ -16,7 +16,7 @@ from gui.lanes.expected import Preview, Stretch
 from gui.lanes.live import LiveSource
 from gui.lanes.source import PlanSource
 from gui.session.steps import facts_of
-from gui.state import CoilKnowledge, WindowState, stop_text, truth
+from gui.state import CoilKnowledge, Lamp, WindowState, stop_text, truth
 from sim_backend.serial_line import wires as serial_wires
 from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.acquisition.ending import Ending
@@ -182,6 +182,17 @@ def test_stop_is_enabled_in_every_state(lab) -> None:
         assert lab.window.header.stop.isVisible()
     lab.session.status.state = WindowState.READY
     lab.window.render_state()
+
+
+def test_nobody_is_said_to_be_well_while_a_run_is_stopped(lab, monkeypatch) -> None:
+    """An instrument that is gone may be why: its lamp was green until the run's end."""
+    session = lab.session
+    monkeypatch.setattr(session.run, "expectation", session.plan.expectation)
+    session.status.enter(WindowState.ABORTING)
+    lamps = {one.name: one.lamp for one in session.snapshot().instruments}
+    session.status.enter(WindowState.READY)
+    del lamps["Model"]
+    assert "Oscilloscope" in lamps and set(lamps.values()) == {Lamp.WAITING}
 
 
 def test_closing_while_running_asks_and_keeps_running_by_default(lab) -> None:
