@@ -35,7 +35,7 @@ from gui.setup.preview import WaveformPreview
 from gui.setup.queue import QueueView
 from gui.setup.sections import Sections
 from gui.setup.subject import Subject
-from gui.state import Snapshot, WindowState, run_problem
+from gui.state import Snapshot, run_problem
 from gui.tab_order import reach
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError
@@ -167,7 +167,7 @@ class SetupPanel(QFrame):
         """Have it follow the run in progress; an edited run is saved instead."""
         if self.subject.edited is not None:
             self.save()
-        elif not self._unusable and self._is_planned(self.enqueue):
+        elif not self._cannot_wait and self._is_planned(self.enqueue):
             expectation = self._session.plan.expectation
             self._session.queue.add(Queued(self.title, self.request(), expectation))
 
@@ -224,10 +224,8 @@ class SetupPanel(QFrame):
         if editing:
             self.buttons.show_edit(self._unusable)
         else:
-            alone = snapshot.state is WindowState.DISCONNECTED
-            cannot_wait = "No bench is connected." if alone else self._unusable
             self.buttons.show_next(
-                snapshot.state, self._blocked(), cannot_wait=cannot_wait
+                snapshot.state, self._blocked(), cannot_wait=self._cannot_wait
             )
 
     def show_head(self, time: float | None) -> None:
@@ -238,6 +236,12 @@ class SetupPanel(QFrame):
     def _unusable(self) -> str:
         """Why the form cannot be used, "" if it can."""
         return self._mistake or self._session.plan.problem
+
+    @property
+    def _cannot_wait(self) -> str:
+        """Why the form's run cannot wait in the queue, "" if it can."""
+        alone = self._session.bench.choice is None
+        return "No bench is connected." if alone else self._unusable
 
     @property
     def _mistake(self) -> str:

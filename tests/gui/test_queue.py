@@ -438,3 +438,18 @@ def test_stop_forgets_a_run_that_waits_for_its_plan(lab) -> None:
     lab.until(lambda: session.plan.expectation is not None)
     lab.app.processEvents()
     assert not session.busy
+
+
+def test_nothing_is_queued_for_no_bench(lab) -> None:
+    """By its key it was, also where the button was locked."""
+    session, setup = lab.session, lab.window.setup
+    session.disconnect_bench()
+    session.plan.expectation = None
+    setup.plan_now()
+    lab.until(lambda: session.plan.expectation is not None)
+    setup.enqueue()
+    assert not waiting(lab) and not setup.buttons.queue.isEnabled()
+    session.connect_bench("not there.toml")
+    lab.until(lambda: session.state is WindowState.FAULT)
+    assert not setup.buttons.queue.isEnabled()
+    lab.window.banner.acknowledge.click()
