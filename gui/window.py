@@ -191,7 +191,7 @@ class Window(QMainWindow):
             event.ignore()
             self.closing.ask(self.session.snapshot())
             return
-        if self.session.busy or self.session.monitor.alive:
+        if self.session.occupied:
             self.session.show_monitor(False)
             self._leaving = True
             event.ignore()
@@ -218,7 +218,7 @@ class Window(QMainWindow):
         QTimer.singleShot(OFF_TIMEOUT, self._off_late)
 
     def _close_when_off(self) -> None:
-        if not self._leaving or self.session.busy or self.session.monitor.alive:
+        if not self._leaving or self.session.occupied:
             return
         self._leaving = False
         if self.session.state is not WindowState.FAULT:

@@ -261,6 +261,11 @@ class Session(QObject):
         return self.run.alive or self.state.in_run or self.manual.alive
 
     @property
+    def occupied(self) -> bool:
+        """Whether the engine still has something to end: a run, a watch, a record."""
+        return self.busy or self.monitor.alive or self.monitor.recording
+
+    @property
     def plan_on_screen(self) -> Expectation | None:
         """The plan of the run in progress, else that of the form."""
         in_run = self.state.in_run

@@ -1,5 +1,7 @@
 """The sensor watched between runs."""
 
+from PySide6.QtGui import QCloseEvent
+
 from gui.state import CoilKnowledge, WindowState
 from tactile_lab.store.run import Run
 
@@ -67,3 +69,18 @@ def test_what_watches_lets_go_of_a_bench_that_is_exchanged(lab) -> None:
     session.disconnect_bench()
     lab.until(lambda: not session.monitor.alive)
     assert session.state is WindowState.DISCONNECTED
+
+
+def test_the_window_stays_until_what_is_recorded_is_kept(lab) -> None:
+    """The engine ends with the window, and a record was cut short by it."""
+    window, session = lab.window, lab.session
+    session.show_monitor(True)
+    lab.until(lambda: session.monitor.sensor.held > 0.3)
+    window.centre.monitor_bar.record.click()
+    session.show_monitor(False)
+    lab.until(lambda: not session.monitor.alive)
+    session.monitor.recording = True  # it may have been quick
+    closing = QCloseEvent()
+    window.closeEvent(closing)
+    assert not closing.isAccepted()
+    window._leaving = session.monitor.recording = False
