@@ -163,13 +163,15 @@ class AboutRun(Overlay):
 
     def _save(self) -> None:
         try:
-            notes = tuple(self._noted())
+            said, seen = read_remarks(self._folder), self._as_read
+            # others note, too, while the card is open
+            late = [one for one in said.notes if seen and one not in seen.notes]
             said = replace(
-                read_remarks(self._folder),
+                said,
                 title=self.title.text().strip(),
                 tags=[t.strip() for t in self.tags.text().split(",") if t.strip()],
                 starred=self.star.isChecked(),
-                notes=notes,
+                notes=(*self._noted(), *late),
             )
             write_remarks(self._folder, said)
         except TactileLabError as error:

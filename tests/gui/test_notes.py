@@ -186,6 +186,16 @@ def test_name_tags_and_notes_are_edited_on_the_card(lab) -> None:
     lab.until(lambda: "The good one" in [c.entry.title for c in runs.cards])
 
 
+def test_a_note_that_came_while_the_card_was_open_is_kept(lab) -> None:
+    """As by the command line, or from a second window."""
+    card, folder = lab.window.runs.card, lab.runs(1)[0]
+    card.show_run(folder)
+    card.notes.setRowCount(0)
+    add_note(folder, "from elsewhere", 0.3)
+    card.save.click()
+    assert [n.text for n in read_remarks(folder).notes] == ["from elsewhere"]
+
+
 def test_a_time_that_is_none_is_refused_on_the_card(lab) -> None:
     card, folder = lab.window.runs.card, lab.runs(1)[0]
     card.show_run(folder)
