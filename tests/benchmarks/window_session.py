@@ -268,7 +268,7 @@ class Session:
             left = self.now["open"] or self.now["dialogs"]
             if self.now["state"] == "ready" and not left:
                 return True
-            if self.now["state"] == "disconnected":
+            if self.now["state"] == "no bench":
                 self.tell("connect")
             if time.monotonic() - self.now["at"] > 0.5:
                 return False  # keys would pile up, and Esc in Ready asks all anew
