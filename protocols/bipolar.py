@@ -73,14 +73,23 @@ class Bipolar(Levels):
         if not held:
             why = "No drain current: no force was completed."
             return Conclusion(missing=cut or (why,))
+        told, unknown = _told_apart(run, held)
+        open_ = show(_shifted(run), "A", 2)
+        cut += tuple(
+            f"No drain current at {t.label}: by one code of offset of V_C1, and by R1 "
+            f"and R2, {open_} may be none at all. Pull less, or use a finer range."
+            for t in unknown
+        )
+        if not told:
+            return Conclusion((), {"tau_s": None}, cut)
         try:
-            tau, changes = _changes(run, held)
+            tau, changes = _changes(run, told)
         except NotIdentifiableError as reason:
             why = f"No drain current: {reason}."
             return Conclusion((), {"tau_s": None}, (why, *cut))
         found = [
             _change(run, trial, change)
-            for trial, change in zip(held, changes, strict=True)
+            for trial, change in zip(told, changes, strict=True)
         ]
         said = [
             "; ".join(_told(c) for c in found)
@@ -116,7 +125,7 @@ class Bipolar(Levels):
         lines: list[tuple[str, Mark, str, FloatArray]]
         lines = [("Eq. (8)", "dotted", "model", theory(run.circuit))]
         with suppress(NotIdentifiableError):
-            tau = _changes(run, held)[0]
+            tau = _changes(run, _told_apart(run, held)[0])[0]
             named = f"with τ = {show(tau.value, 's', 3)}"
             fitted = theory(replace(run.circuit, tau=tau.value))
             lines.append((named, "dashed", "V_C1", fitted))
@@ -160,6 +169,31 @@ class Bipolar(Levels):
         )
 
 
+def _told_apart(
+    run: Measurement, held: list[MeasuredTrial]
+) -> tuple[list[MeasuredTrial], list[MeasuredTrial]]:
+    """Holds whose drain current is more than all currents may be shifted by; others."""
+    trace, least = run.trace("I_DS"), _shifted(run)
+    if trace is None:
+        return [], held
+    known = []
+    for trial in held:
+        start, end = trial.held or (0.0, 0.0)
+        inside = (trace.time >= start + SETTLING) & (trace.time <= end)
+        if np.all(trace.mean[inside] > least):
+            known.append(trial)
+    return known, [trial for trial in held if trial not in known]
+
+
+def _shifted(run: Measurement) -> float:
+    """What V_C1's channel and the resistors leave open of all currents alike, A."""
+    if run.circuit is None:
+        return 0.0
+    V_C1, conductance = run.trace("V_C1"), 1 / run.circuit.R1 + 1 / run.circuit.R2
+    code = (0.0 if V_C1 is None else V_C1.code or 0.0) * conductance
+    return math.hypot(code, _resistors(run.circuit, conductance)[1])
+
+
 def _changes(
     run: Measurement, held: list[MeasuredTrial]
 ) -> tuple[Estimate, list[Estimate]]:
@@ -194,10 +228,9 @@ def _changes(
     conductance, V_C1 = 0.0, run.trace("V_C1")
     if run.circuit is not None:
         conductance = 1 / run.circuit.R1 + 1 / run.circuit.R2
-    code = (0.0 if V_C1 is None else V_C1.code or 0.0) * conductance
     steps = run.step_bias("V_C1") * conductance
-    resistors, shifted = _resistors(run.circuit, conductance)
-    causes = (math.hypot(code, shifted), 0.0), (0.0, steps)
+    resistors, _ = _resistors(run.circuit, conductance)
+    causes = (_shifted(run), 0.0), (0.0, steps)
     # either way: tau does not follow an offset in proportion
     moved = [
         (fitted(*cause), fitted(*(-size for size in cause)))

@@ -17,10 +17,10 @@ from tactile_lab.waveform import Waveform
 CODE = 4.0 / 254
 
 
-def pushed_and_pulled(seed, *, late=0.06, code=CODE, noise=5e-3):
+def pushed_and_pulled(seed, *, late=0.06, code=CODE, noise=5e-3, levels=(0.08, -0.08)):
     """A `bipolar` run of +-80 mN by a scope of such codes, V; forces come `late` s."""
     steps = []
-    for level in (0.08, -0.08):
+    for level in levels:
         pulse = Waveform.pulse(level, ramp=0.25, hold=5.0, rest=4.0)
         wave = Waveform(np.append(0.0, pulse.time + late), np.append(0.0, pulse.value))
         steps.append((f"{level * 1e3:g} mN", level, wave, False))
@@ -114,3 +114,13 @@ def test_bipolar_without_a_rest_before_it_says_so():
     cut = replace(run.traces[0], time=time, mean=mean)
     found = find(replace(run, trials=late, traces=(cut,))).conclusion
     assert "current at rest is not known" in found.missing[0]
+
+
+def test_bipolar_tells_what_it_can_beside_a_pull_that_leaves_no_current():
+    """By a coarse converter 5 nA may be none; the push before it was left out too."""
+    found = find(pushed_and_pulled(0, code=0.04, levels=(0.08, -0.15))).conclusion
+    (change,) = found.plain["I_DS_changes"]
+    assert change["level_N"] == 0.08
+    assert abs(change["change_A"] - 34.1e-9) < change["change_uncertainty_A_95"]
+    (left_out,) = found.missing
+    assert "at -150 mN" in left_out and "nA may be none" in left_out
