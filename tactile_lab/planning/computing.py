@@ -20,7 +20,6 @@ from tactile_lab.deviation import Deviation
 from tactile_lab.planning.needs import Needs, compared
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.scene.scene import Scene
-from tactile_lab.scene.tables import Simulated
 
 REFERENCE = 0.72e-3
 """What one round of the work takes where the seconds below were measured, s."""
@@ -140,16 +139,17 @@ def computing(
             + COMPARED_SPIKE * spikes
         )
         memory += MEMORY_POINT * points
-        if scene.bench.simulated and _surprises(scene.simulated):
+        if not scene.circuit.saturation and _surprises(scene):
             told["search for a cause"] = SEARCHED + SEARCHED_SPIKE * spikes
     time_ = {part: slow * seconds for part, seconds in told.items() if seconds}
     return Computing(time=time_, memory=memory)
 
 
-def _surprises(simulated: Simulated) -> bool:
+def _surprises(scene: Scene) -> bool:
     """Whether a simulated bench is other than the model beside it believes."""
-    other = simulated.specimen, simulated.hysteresis, simulated.attraction
-    return any(other) or simulated.deviation != Deviation()
+    world = scene.simulated
+    other = world.specimen, world.hysteresis, world.attraction
+    return scene.bench.simulated and (any(other) or world.deviation != Deviation())
 
 
 def set_points(drive: Timeline, interval: float | None) -> float:

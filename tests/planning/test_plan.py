@@ -341,6 +341,8 @@ def test_a_search_is_foreseen_where_the_scene_has_its_bench_deviate():
     for other in ("specimen=9", "hysteresis=50 mA"):
         found = plan(load(None, [f"simulated.{other}"])).computing
         assert "search for a cause" in found.time
+    saturated = plan(load("surprise", ["sensor.saturation=true"])).computing
+    assert "search for a cause" not in saturated.time  # none is sought there
 
 
 def test_a_drain_current_keeps_the_v_c1_that_it_is_derived_from():
