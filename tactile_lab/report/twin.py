@@ -156,6 +156,8 @@ def sentences(beside: BesideModel, run: Measurement) -> tuple[str, ...]:
             "though each may lie within its own tolerance. "
             f"{beside.explanation.text}"
         )
+    elif run.circuit is not None and run.circuit.saturation:
+        said.append("Where T1 saturates no cause is sought if it misses.")
     for residual in found.residuals:
         shifted, known = "", residual.tolerance
         if residual.signal == "V_C2" and found.spikes is not None:

@@ -11,6 +11,7 @@ import pytest
 from tactile_lab.engine.execution import Execution
 from tactile_lab.engine.model_parts import SOLVED, StoredParts
 from tactile_lab.model.advance import advance
+from tactile_lab.model.circuit import Circuit
 from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
 from tactile_lab.report.identified import identify_run
@@ -107,6 +108,13 @@ def test_the_error_budget_tells_what_is_stated_and_what_is_not(as_believed):
     line = find(as_believed).beside.budget_line
     assert "force, temperature not stated" in line
     assert line.startswith("Model (95 %, median over the run): spike times ±")
+
+
+def test_it_is_told_where_no_cause_is_sought(as_believed):
+    beside, told = find(as_believed).beside, "no cause is sought"
+    assert not any(told in text for text in sentences(beside, as_believed))
+    saturated = replace(as_believed, circuit=Circuit(saturation=True))
+    assert any(told in text for text in sentences(beside, saturated))
 
 
 def test_a_surprise_is_found_out_by_the_report(tmp_path):
