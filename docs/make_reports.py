@@ -139,7 +139,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("words", nargs="*", help=f"of these: {', '.join(STEPS)}")
     parser.add_argument("--pages", action="store_true", help="measure nothing")
-    options = parser.parse_args()
+    options = parser.parse_args(sys.argv[1:])
     if options.pages:
         print(pages())
         return
