@@ -31,6 +31,7 @@ from tactile_lab.store.progress import Progress, each, nothing
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.stored_run import ended
+from tactile_lab.store.warned import told as warned_told
 from tactile_lab.waveform import Waveform
 
 CELLS = 4000
@@ -85,12 +86,17 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             asks_I_DS="I_DS" in scene.record.signals,
             loss=_loss(info),
             accuracy=str(info.get("accuracy") or ""),
-            warnings=(
-                *_as_it_fell(run),
-                *overrange_told(run),
-                *mains_told(run),
-                *warnings,
-                *_doubts(scene, started, settings, warnings),
+            warnings=tuple(
+                dict.fromkeys(
+                    (
+                        *_as_it_fell(run),
+                        *overrange_told(run),
+                        *mains_told(run),
+                        *warnings,
+                        *_doubts(scene, started, settings, warnings),
+                        *warned_told(run),
+                    )
+                )
             ),
             assumptions=(*(info.get("assumptions") or ()), *told(run)),
             parameters=_texts(scene, "protocol"),

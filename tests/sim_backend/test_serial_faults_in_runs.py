@@ -12,6 +12,7 @@ from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.engine.execution import Execution
 from tactile_lab.planning.needs import needs
+from tactile_lab.report.from_run import read
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
 
@@ -70,6 +71,9 @@ def test_set_points_that_came_too_late_are_told_and_stored(tmp_path: Path) -> No
     log = (done.folder / "log.jsonl").read_text(encoding="utf-8")
     assert "coil set-points came too late and were skipped" in log
     assert "the source answered late" in log and "computer" not in log
+    reported = " ".join(read(done.folder).warnings)
+    assert "coil set-points came too late and were skipped" in reported
+    assert reported.count("Check the link to it.") == log.count("Check the link to it.")
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from tactile_lab.store.overrange import told as overrange_told
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 from tactile_lab.store.stored_run import ended
+from tactile_lab.store.warned import told as warned_told
 
 UNITS = {
     "gaps": {"start": "s", "end": "s"},
@@ -136,7 +137,8 @@ def about(run: Run, names: tuple[str, ...] = ()) -> dict[str, str | float]:
         told["force uncertainty"] = "not stated" if known is None else known.text
     if loss := (info.get("loss") or {}).get("text"):
         told["loss"] = str(loss).removeprefix("loss: ")
-    warnings = *overrange_told(run), *(info.get("warnings") or ())
+    planned = info.get("warnings") or ()
+    warnings = dict.fromkeys((*overrange_told(run), *planned, *warned_told(run)))
     for kind, texts in (("warning", warnings), ("assumption", info.get("assumptions"))):
         told |= {f"{kind} {n}": str(text) for n, text in enumerate(texts or (), 1)}
     if (run.path / SCENE).exists():
