@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ from tactile_lab.commands.terminal import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from contextlib import ExitStack
     from pathlib import Path
 
@@ -290,8 +290,8 @@ def concluded(
     """Tell of a run that ended, write its report, and do what follows a run.
 
     How it ended, and how the coil was left, is told first, and once. Nothing in here
-    changes it: what fails is told. False where a signal cut this short: then whoever
-    has more to do ends, too.
+    changes it: what fails is told, and what comes after is done all the same. False
+    where a signal cut this short: then whoever has more to do ends, too.
 
     Args:
         done: how it ended.
@@ -301,17 +301,20 @@ def concluded(
     if done.exit_code:
         with suppress(OSError):  # nobody may be there to read it
             say(f"tactile-lab: {done.told}", sys.stderr)
+    report: Report | None = None
     with interrupted():
-        try:
+        whole = Whole(done.folder)
+        with whole.though("the report"):
             for text in overrange(done):
                 warn(text)
-            report = None if no_report else write_report(done.folder)
+            if not no_report:
+                report = write_report(done.folder)
+        with whole.though("what it says of the run"):
             tell(done, report)
-            _follow(done.folder)
-        except (Exception, KeyboardInterrupt) as failure:
-            _unreported(done.folder, failure)
-            return not isinstance(failure, KeyboardInterrupt)
-    return True
+        if not whole.ended:
+            with whole.though("after_run"):
+                _follow(done.folder)
+    return not whole.ended
 
 
 def caught_up(folder: Path, *, no_report: bool) -> bool:
@@ -322,14 +325,42 @@ def caught_up(folder: Path, *, no_report: bool) -> bool:
     from tactile_lab.store.folder import REPORT
 
     with interrupted():
-        try:
+        whole = Whole(folder)
+        with whole.though("the report"):
             if not no_report and not (folder / REPORT).exists():
                 write_report(folder)
-            _follow(folder)
+        if not whole.ended:
+            with whole.though("after_run"):
+                _follow(folder)
+    return not whole.ended
+
+
+class Whole:
+    """A run that stays what it was, though what comes after it fails.
+
+    Args:
+        folder: the run's.
+
+    Attributes:
+        ended: whether a signal cut short what came after it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self.ended = False
+
+    @contextmanager
+    def though(self, what: str) -> Iterator[None]:
+        """Say that `what` was cut short where it fails within."""
+        try:
+            yield
         except (Exception, KeyboardInterrupt) as failure:
-            _unreported(folder, failure)
-            return not isinstance(failure, KeyboardInterrupt)
-    return True
+            self.ended = self.ended or isinstance(failure, KeyboardInterrupt)
+            text = f"{type(failure).__name__}: {failure}".removesuffix(": ")
+            warn(
+                f"{what} was cut short ({text}). The run is kept in {self._folder}; "
+                f"`tactile-lab report {self._folder}` writes its report again."
+            )
 
 
 def _follow(folder: Path) -> None:
@@ -341,15 +372,6 @@ def _follow(folder: Path) -> None:
         problem = said.follow(folder)
     if problem:
         warn(problem)
-
-
-def _unreported(folder: Path, failure: BaseException) -> None:
-    """Say that the run could not be told of to the end, if that can be said."""
-    text = f"{type(failure).__name__}: {failure}".removesuffix(": ")
-    warn(
-        f"the report was cut short ({text}). The run is kept in {folder}; "
-        f"`tactile-lab report {folder}` writes it again."
-    )
 
 
 def tell_of(done: Executed, watchers: Watchers, *, no_report: bool) -> bool:

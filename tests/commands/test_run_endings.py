@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from tactile_lab.lab import Lab
+
 SHORT = [
     "--set", 'protocol.levels=["200 mN"]',
     "--set", "protocol.hold=0.2 s",
@@ -64,3 +66,32 @@ def test_a_terminal_that_was_closed_does_not_end_the_run(tmp_path, closed, optio
     (run,) = tmp_path.iterdir()
     info = json.loads((run / "run.json").read_text())
     assert info["status"] == "complete" and info["coil_verified_off"] is True
+
+
+@pytest.mark.parametrize("failure", AFTERWARDS, ids=lambda one: type(one).__name__)
+def test_a_report_that_fails_leaves_the_answer_whole(
+    tactile_lab, tmp_path, monkeypatch, failure
+):
+    def fails(*_):
+        raise failure
+
+    monkeypatch.setattr("tactile_lab.report.write.write", fails)
+    done = tactile_lab("run", *SHORT, "--json", "--out", tmp_path)
+    (run,) = tmp_path.iterdir()
+    assert done.json["run"] == str(run)
+    assert done.json["status"] == "complete" and done.json["report"] is None
+
+
+def test_what_follows_a_run_is_called_where_nobody_reads_on(
+    tactile_lab, tmp_path, monkeypatch
+):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    followed = []
+    monkeypatch.setattr(Lab, "follow", lambda _, run: followed.append(run) or "")
+    monkeypatch.setattr("tactile_lab.commands.run.print_run", full)
+    done = tactile_lab("run", *SHORT, "--no-report", "--out", tmp_path)
+    assert done.code == 0
+    assert followed == [*tmp_path.iterdir()]
+    assert "the report was cut short" not in done.err
