@@ -6,7 +6,7 @@ import json
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -71,6 +71,10 @@ class SequenceRun:
         """
         return scene_asked(self.scene, self.changes, self.bench)
 
+    def folder(self, state: Path) -> Path:
+        """Of its run, beside the sequence's state, wherever that lies by now."""
+        return state.parent / Path(self.run).name
+
 
 @click.command()
 @click.argument("scenes", nargs=-1, metavar="SCENE...|FILE")
@@ -111,7 +115,10 @@ def command(
     with Signals() as signals, ExitStack() as served:
         with refusing():
             state = out / STATE
-            steps = _resumed(state, scenes) if resume else _asked(scenes, bench)
+            known = state.exists()
+            if known:
+                served.enter_context(_alone(state))
+            steps = _resumed(state, scenes, bench) if resume else _asked(scenes, bench)
             if not resume:
                 _refuse_to_forget(state)
             _plan_all(steps)
@@ -119,6 +126,8 @@ def command(
             start = None if begin is None else _time(begin)
             others = tell_others(status, live, served, signals)
             signals.look()
+            if not known:
+                served.enter_context(_alone(state))
             _keep(state, steps)
         if start is not None:
             _wait(start, signals)
@@ -128,16 +137,17 @@ def command(
                 break
             if step.status == "complete":
                 if not step.told:
-                    if not caught_up(Path(step.run), no_report=no_report):
+                    if not caught_up(step.folder(state), no_report=no_report):
                         code = INTERRUPTED
                         break
                     steps[number] = replace(step, told=True)
                     _keep(state, steps)
                 continue
             if step.status == "running":
+                cut = step.folder(state)
                 warn(
-                    f"{step.run} was not ended; `tactile-lab recover {step.run}` makes "
-                    "whole what it holds. It is done again."
+                    f"{cut} was not ended; `tactile-lab recover {cut}` makes whole "
+                    "what it holds. It is done again."
                 )
             say(f"{number + 1} of {len(steps)}: {step.scene}", sys.stderr)
             with refusing():
@@ -202,10 +212,35 @@ def _named(name: str, bench: str | None) -> Iterator[SequenceRun]:
         yield from [SequenceRun(file, changes, own)] * times
 
 
-def _resumed(state: Path, scenes: tuple[str, ...]) -> list[SequenceRun]:
+@contextmanager
+def _alone(state: Path) -> Iterator[None]:
+    """No other program goes on with that sequence meanwhile.
+
+    Raises:
+        SceneError: one does, or the folder cannot be written.
+    """
+    from tactile_lab.store.folder import lock
+    from tactile_lab.whole_file import failing_as
+
+    with ExitStack() as held:
+        with failing_as(f"No sequence can be kept in {state.parent}", kind=SceneError):
+            state.parent.mkdir(parents=True, exist_ok=True)
+            file = held.enter_context(state.with_suffix(".lock").open("a"))
+        if not lock(file):
+            raise SceneError(
+                f"Another program goes on with {state}. Wait for its end, or name "
+                "another folder with --out."
+            )
+        yield
+
+
+def _resumed(
+    state: Path, scenes: tuple[str, ...] = (), bench: str | None = None
+) -> list[SequenceRun]:
     """The sequence that was begun in that folder."""
-    if scenes:
-        raise SceneError(f"--resume goes on with {state}; leave the scenes out.")
+    if scenes or bench:
+        what = "the scenes" if scenes else "--bench"
+        raise SceneError(f"--resume goes on with {state} as begun; leave {what} out.")
     try:
         held = json.loads(state.read_text(encoding="utf-8"))
         return [SequenceRun(**one) for one in held["runs"]]
@@ -221,7 +256,7 @@ def _resumed(state: Path, scenes: tuple[str, ...]) -> list[SequenceRun]:
 def _refuse_to_forget(state: Path) -> None:
     if not state.exists():
         return
-    left = [s for s in _resumed(state, ()) if s.status != "complete"]
+    left = [s for s in _resumed(state) if s.status != "complete"]
     if left:
         raise SceneError(
             f"{state} holds a sequence with {len(left)} runs to be done. Go on with "
@@ -232,6 +267,7 @@ def _refuse_to_forget(state: Path) -> None:
 def _plan_all(steps: list[SequenceRun]) -> None:
     """Refuse before anything is opened what any of them would be refused for."""
     from tactile_lab.planning.plan import plan
+    from tactile_lab.quantity import count
 
     planned: dict[str, float] = {}
     whole = 0.0
@@ -242,13 +278,12 @@ def _plan_all(steps: list[SequenceRun]) -> None:
         if key not in planned:
             planned[key] = plan(step.load(), preview=False).estimate.duration
         whole += planned[key]
-    say(f"{len(steps)} runs, {whole:.4g} s of experiment to do", sys.stderr)
+    say(f"{count(len(steps), 'run')}, {whole:.4g} s of experiment to do", sys.stderr)
 
 
 def _keep(state: Path, steps: list[SequenceRun]) -> None:
     from tactile_lab.store.folder import write_json
 
-    state.parent.mkdir(parents=True, exist_ok=True)
     write_json(state, {"runs": [asdict(step) for step in steps]})
 
 
@@ -260,7 +295,9 @@ def _time(text: str) -> datetime:
             clock = datetime.strptime(text, "%H:%M").time()
             today = datetime.combine(now.date(), clock)
             return today if today >= now else today + timedelta(days=1)
-        when = datetime.fromisoformat(text).replace(tzinfo=None)
+        when = datetime.fromisoformat(text)
+        if when.tzinfo is not None:
+            when = when.astimezone().replace(tzinfo=None)
     except ValueError as reason:
         raise SceneError(
             f"--at {text}: write HH:MM, or a date and time such as 2026-12-01T22:00."

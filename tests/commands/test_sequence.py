@@ -3,13 +3,16 @@
 import json
 import signal
 import socket
+import subprocess
 import sys
+import time
 from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
 from late_ctrl_c import late
 
+from tactile_lab.commands.sequence import _time
 from tactile_lab.commands.status_server import StatusServer
 from tactile_lab.engine.execution import Execution
 from tactile_lab.lab import Lab
@@ -209,3 +212,66 @@ def test_what_a_kill_left_undone_after_a_run_is_done_on_resume(
     assert called.read_text() == f"{first['run']}{again[1]}"
     assert sequence("--resume").code == 0
     assert called.read_text() == f"{first['run']}{again[1]}"
+
+
+def test_one_that_goes_on_is_not_gone_on_with_by_another_program(
+    sequence, asked, tmp_path, monkeypatch
+):
+    """It was: the run in progress was said not to have ended, and done again."""
+    ended = StatusServer.end
+
+    def another_program(server, result):
+        ended(server, result)
+        second = [sys.executable, "-m", "tactile_lab", "sequence", "--resume"]
+        second += ["--no-report", "--out", tmp_path / "runs"]
+        answers.append(subprocess.run(second, check=False, capture_output=True))
+
+    answers = []
+    monkeypatch.setattr(StatusServer, "end", another_program)
+    runs = asked({"scene": "demo"})
+    assert sequence(runs, "--status", "tcp://127.0.0.1:0").code == 0
+    assert [answer.returncode for answer in answers] == [2]
+    assert b"Another program goes on with" in answers[0].stderr
+    assert len([*(tmp_path / "runs").glob("*/run.json")]) == 1
+
+
+def test_a_time_of_another_zone_is_that_time_here(monkeypatch):
+    monkeypatch.setenv("TZ", "Europe/Berlin")
+    time.tzset()
+    try:
+        assert _time("2031-01-01T22:00Z") == datetime(2031, 1, 1, 23, 0)
+        assert _time("2031-01-01T22:00") == datetime(2031, 1, 1, 22, 0)
+    finally:
+        monkeypatch.undo()
+        time.tzset()
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tactile_lab, tmp_path):
+    (tmp_path / "file").touch()
+    answer = tactile_lab("sequence", "v_c1_only", "--out", tmp_path / "file" / "runs")
+    assert answer.code == 2
+    assert "No sequence can be kept in" in answer.err
+
+
+def test_what_follows_a_run_finds_it_from_another_folder(
+    sequence, tactile_lab, asked, tmp_path, monkeypatch
+):
+    """`--out runs` is kept as it was given, and the next program begins elsewhere."""
+    monkeypatch.chdir(tmp_path)
+    runs = asked({"scene": "demo"})
+    assert tactile_lab("sequence", runs, "--no-report", "--out", "runs").code == 0
+    state = tmp_path / "runs" / "sequence.json"
+    state.write_text(state.read_text().replace('"told": true', '"told": false'))
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    followed = []
+    monkeypatch.setattr(Lab, "follow", lambda _, run: followed.append(run) or "")
+    assert sequence("--resume").code == 0
+    assert [run.is_dir() for run in followed] == [True]
+
+
+def test_resume_is_not_told_another_bench(sequence, asked):
+    assert sequence(asked({"scene": "demo"})).code == 0
+    answer = sequence("--resume", "--bench", "sim")
+    assert answer.code == 2
+    assert "leave --bench out" in answer.err
