@@ -6,6 +6,7 @@ import errno
 import importlib
 import importlib.util
 import io
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -110,8 +111,16 @@ def cli() -> None:
     """Instrument control for spiking, adapting piezoelectric tactile sensors."""
 
 
+def _open_streams() -> None:
+    """Give each standard stream that was closed before the start a place to go."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit with its code."""
+    _open_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a pipe's encoding may lack µ or −

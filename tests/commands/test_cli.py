@@ -1,7 +1,9 @@
 """The command line answers at once, imports what a verb needs, and knows its verbs."""
 
+import json
 import os
 import resource
+import shlex
 import subprocess
 import sys
 
@@ -162,3 +164,15 @@ def test_the_shell_completes_verbs_scenes_keys_and_runs(tmp_path, monkeypatch, c
     newest_first = ["runs/2026-01-02_demo", "runs/2026-01-01_demo"]
     assert offered("tactile-lab show ") == newest_first
     assert offered("tactile-lab verify runs/2026-01-02") == newest_first[:1]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a POSIX shell closes them")
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "<&- >&- 2>&-"])
+def test_streams_that_were_closed_before_the_start(tmp_path, closed):
+    """As a service may start it; on Windows pythonw has none at all."""
+    verb = f"run v_c1_only --no-report --set record.sample_rate='20 kS/s' {closed}"
+    command = f"{shlex.quote(sys.executable)} -m tactile_lab {verb}"
+    done = subprocess.run(["sh", "-c", command], cwd=tmp_path, check=False)
+    assert done.returncode == 0
+    (run,) = (tmp_path / "runs").iterdir()
+    assert json.loads((run / "run.json").read_text())["status"] == "complete"
