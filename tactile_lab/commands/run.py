@@ -6,6 +6,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING
 
 import click
@@ -93,6 +94,8 @@ def command(
         with refusing():
             loaded = _scene(scene, overrides, bench, again)
             signals.look()
+            if transcripts is not None:
+                make_folder(transcripts)
             execution, watchers = prepared(
                 loaded,
                 out,
@@ -121,17 +124,27 @@ def command(
     raise click.exceptions.Exit(done.exit_code)
 
 
-def record(bench: Bench, folder: Path) -> None:
-    """Have each serial instrument of `bench` write a transcript into `folder`.
+def make_folder(folder: Path) -> None:
+    """Make the folder for transcripts, before there is one of a run.
 
     Raises:
-        SceneError: the files cannot be written.
+        SceneError: it cannot be written.
     """
     from tactile_lab.errors import SceneError
     from tactile_lab.whole_file import failing_as
 
     with failing_as(f"Transcripts cannot be put into {folder}", kind=SceneError):
         folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            pass
+
+
+def record(bench: Bench, folder: Path) -> None:
+    """Have each serial instrument of `bench` write a transcript into `folder`.
+
+    Raises:
+        SceneError: the files cannot be written.
+    """
     names = ("coil", "field_meter", "thermometer")
     found = {name: getattr(bench, name) for name in names}
     found |= dict(bench.voltage_sources)

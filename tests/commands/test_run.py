@@ -159,3 +159,12 @@ def test_refusals_are_one_message_and_write_nothing(
         assert word in answer.err
     assert answer.out == ""
     assert list(tmp_path.iterdir()) == []
+
+
+def test_transcripts_that_cannot_be_put_there_leave_no_run(tactile_lab, tmp_path):
+    (tmp_path / "file").touch()
+    where = ("--out", tmp_path / "runs", "--transcript", tmp_path / "file" / "talk")
+    refused = tactile_lab("run", "v_c1_only", *where)
+    assert refused.code == 2
+    assert "Transcripts cannot be put into" in refused.err
+    assert not (tmp_path / "runs").exists()
