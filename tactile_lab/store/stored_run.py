@@ -74,9 +74,11 @@ class StoredRun:
                 f"Put it back; `tactile-lab run --again {path}` repeats the run."
             )
         if not file.exists():
+            status = info["status"]
+            how = "was cut short" if status == "running" else f"ended ({status})"
             raise RunFolderError(
-                f"{path} has no {DATA}: the run ended ({info['status']}) before the "
-                "first sample was stored. `tactile-lab show` says why; "
+                f"{path} has no {DATA}: the run {how} before the first "
+                "sample was stored. `tactile-lab show` says why; "
                 f"`tactile-lab run --again {path}` repeats it."
             )
         try:

@@ -53,6 +53,14 @@ def test_a_run_without_samples_says_what_to_do(tactile_lab, empty_run, verb):
     assert "run --again" in answer.err
 
 
+def test_a_run_killed_before_its_first_sample_did_not_end(tactile_lab, tmp_path):
+    killed = RunFolder.create(tmp_path, "killed", {})
+    killed._log.close()
+    answer = tactile_lab("report", killed.path)
+    assert answer.code == 2
+    assert "was cut short before the first sample" in answer.err
+
+
 @pytest.mark.parametrize("verb", ["show", "recover", "report"])
 def test_a_file_in_place_of_a_run_is_no_damage(tactile_lab, empty_run, verb):
     answer = tactile_lab(verb, empty_run / INFO)
