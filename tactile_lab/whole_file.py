@@ -7,6 +7,7 @@ What grows while a run goes on (samples, ledger, log) has a way of its own.
 from __future__ import annotations
 
 import csv
+import errno
 import itertools
 import os
 import shutil
@@ -81,9 +82,11 @@ def replacing(path: Path, size: int = 0, *, lasting: bool = False) -> Iterator[P
 
     Raises:
         RecordingError: that many are not free, or a device or pipe has that name.
-        OSError: it cannot be written.
+        OSError: it cannot be written, or is a folder.
     """
-    if path.exists() and not (path.is_file() or path.is_dir()):
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if path.exists() and not path.is_file():
         raise RecordingError(
             f"{path} is a device or a pipe; a file in its place would end it. "
             "Give another name."

@@ -104,3 +104,12 @@ def test_no_file_takes_the_place_of_a_device_or_a_pipe(tmp_path):
         write_text(tmp_path / "pipe", "text")
     assert (tmp_path / "pipe").is_fifo()
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_folder_is_not_a_file_to_be(tmp_path, monkeypatch):
+    """Said before anything is written; "." has no name to write a part beside."""
+    monkeypatch.chdir(tmp_path)
+    for folder in (tmp_path, Path(".")):
+        with pytest.raises(IsADirectoryError), replacing(folder):
+            pytest.fail("it was begun")
+    assert not list(tmp_path.iterdir())

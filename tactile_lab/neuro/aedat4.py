@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tactile_lab.errors import ParameterError
 from tactile_lab.neuro.tonic import pixels, whole_us
 from tactile_lab.skin.events import Events
 from tactile_lab.store.export.library import library
 
+ENDING = ".aedat4"
 PIECE = 1 << 16
 """Spikes in one packet."""
 
@@ -17,8 +19,16 @@ def write(events: Events, file: Path) -> None:
 
     Raises:
         RunFolderError: dv-processing is not installed.
-        ParameterError: more columns or rows than pixels have numbers.
+        ParameterError: more columns or rows than pixels have numbers, or the file has
+            another ending.
+        OSError: it cannot be written.
     """
+    if file.suffix != ENDING:  # else the library ends the whole program
+        raise ParameterError(
+            f"AEDAT4 goes into a file that ends in {ENDING}; yours ends in "
+            f'"{file.suffix}".'
+        )
+    file.touch()  # the library's own words are a page of C++
     dv = library("dv_processing", "dv-processing")
     place = pixels(events)
     width, height = (int(most) + 1 for most in place.max(axis=0))

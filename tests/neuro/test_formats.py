@@ -1,5 +1,6 @@
 """Spikes come back from the library that reads a format as they went out."""
 
+import subprocess
 import sys
 from dataclasses import replace
 
@@ -178,3 +179,14 @@ def test_a_run_without_spikes_says_so(run, monkeypatch):
     monkeypatch.setattr(type(run), "detection", None)
     with pytest.raises(RunFolderError, match="none were detected"):
         events_of(run)
+
+
+def test_aedat4_has_its_ending(skin_folder, tmp_path):
+    """Else dv-processing ends the whole program."""
+    pytest.importorskip("dv_processing")
+    verb = ["-m", "tactile_lab", "export", skin_folder, "--to", "aedat4"]
+    command = [sys.executable, *verb, "--out", tmp_path / "e.dat"]
+    done = subprocess.run(command, check=False, capture_output=True)
+    assert done.returncode == 2
+    assert b'ends in ".dat"' in done.stderr
+    assert not list(tmp_path.iterdir())
