@@ -60,6 +60,8 @@ def command(
     started >= 2026-11-01'.
     """
     with refusing():
+        if as_csv and (as_json or keys):
+            raise SceneError("--csv prints a table; leave out --json and --keys.")
         from tactile_lab.store.catalogue import Catalogue
 
         with Catalogue(root) as found:
@@ -72,7 +74,9 @@ def command(
         if key is not None:
             order = ordered(facts, key, backwards=sort != key)
             entries, facts = [entries[i] for i in order], [facts[i] for i in order]
-    if keys:
+    if keys and as_json:
+        print_json({"keys": examples(facts)})
+    elif keys:
         for name, example in sorted(examples(facts).items()):
             say(f"{name:<34} {example}")
     elif as_csv:
@@ -82,7 +86,8 @@ def command(
     else:
         print_list(entries, key, facts)
     if not entries:
-        say(f"No run in {root} matches.", sys.stderr)
+        asked = " matches" if search or where else ""
+        say(f"No run in {root}{asked}.", sys.stderr)
 
 
 def _check_key(key: str, keys: Collection[str]) -> None:

@@ -1,6 +1,7 @@
 """The catalogue lists what is there, and its index is never trusted too far."""
 
 import csv
+import json
 import math
 import re
 import shutil
@@ -176,10 +177,14 @@ def test_the_list_the_table_and_the_keys(levels):
     assert [row["tau (s)"] for row in rows] == ["2.0", "9.5"]
     assert rows[0]["protocol.levels (N)"] == "0.1 0.3"
     assert any(x.split() == ["critical_force", "99.5", "mN"] for x in said("--keys"))
+    (told,) = said("--keys", "--json")
+    assert json.loads(told)["keys"]["critical_force"] == "99.5 mN"
     assert len(said("--sort", "tag")) == 3
     assert said("--sort", "tau", "--where", "note ~ 50%")[1].split()[-2] == "9.5"
     wrong = CliRunner().invoke(cli, ["runs", str(levels), "--sort", "taw"])
     assert wrong.exit_code == 2 and 'did you mean "tau"' in wrong.output
+    both = CliRunner().invoke(cli, ["runs", str(levels), "--csv", "--json"])
+    assert both.exit_code == 2 and "leave out --json" in both.output
 
 
 def test_a_run_that_cannot_be_read_is_listed_as_such(root):
