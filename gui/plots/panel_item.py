@@ -167,13 +167,15 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
             if v is not None and s.mark != "ticks"
         ]
         across = (g for g in panel.guides if g.along == "x")
+        # with the limits: air is a share of all that is in view
+        least, most = (None if end is None else self._y(end) for end in panel.limits)
+        ends = [end for end in (least, most) if end is not None]
         low, high = _range(
-            [*shown, *(self._y(e) for g in across for e in _ends(g))], False
+            [*shown, *(self._y(e) for g in across for e in _ends(g)), *ends], False
         )
-        least, most = panel.limits
         return [
-            low if least is None else float(self._y(least)),
-            high if most is None else float(self._y(most)),
+            low if least is None else float(least),
+            high if most is None else float(most),
         ]
 
     def _heading(self, text: str) -> str:

@@ -93,6 +93,17 @@ def test_one_value_but_for_rounding_has_an_axis_that_can_be_read(app) -> None:
     assert 10 < right - left < 30 and left < 160 < right
 
 
+def test_what_is_near_its_other_limit_has_air_about_it(app) -> None:
+    """Three rates about 15 Hz above 0: their dots stood half cut at the upper edge."""
+    line = Series(x=(1.0, 2.0, 3.0), y=[15.2, 15.4, 15.2])
+    panel = Panel(label="rate", unit="Hz", series=(line,), limits=(0.0, None))
+    plot = Plot(name="near", caption="", x_label="t", x_unit="s", panels=(panel,))
+    view = SmallPlot(Theme("light"))
+    view.show_plot(plot)
+    low, high = view.panels[0].box.whole[1]
+    assert low == 0 and high > 1.05 * 15.4
+
+
 def test_a_text_of_many_lines_stands_below_its_plot(app) -> None:
     """Five fitted values stood over the data they are of."""
     lines = "\n".join(f"line {k}" for k in range(5))
