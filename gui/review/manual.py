@@ -143,8 +143,9 @@ class ManualView(QWidget):
             self.slider.setValue(round(100 * asked / self._limit) if self._limit else 0)
 
     def _show_coil(self, coil: CoilView | None) -> None:
-        self.now.setText("—" if coil is None else milliamperes(coil.current))
         what = truth(WindowState.READY, coil)
+        known = None if what is CoilKnowledge.UNKNOWN else coil
+        self.now.setText("—" if known is None else milliamperes(known.current))
         if what is CoilKnowledge.UNKNOWN:
             self.force.setText("state unknown: look at the source")
         elif coil is None or coil.output is not True:

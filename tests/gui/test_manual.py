@@ -3,7 +3,7 @@
 import pytest
 from PySide6.QtTest import QTest
 
-from gui.state import CoilKnowledge, WindowState, truth
+from gui.state import STALE, CoilKnowledge, CoilView, Snapshot, WindowState, truth
 from tactile_lab.acquisition.ending import CoilState, Ending
 from tactile_lab.acquisition.events import CoilCurrent, Message, RunState
 from tactile_lab.bench import OffReport
@@ -212,3 +212,10 @@ def test_a_current_that_a_warm_coil_is_refused_is_told(lab) -> None:
     manual = lab.session.manual
     manual.hear(Message("warning", "The coil is still warm: 1 A may flow in 90 s."))
     assert "still warm" in lab.session.log.lines[-1].text
+
+
+def test_no_current_is_claimed_of_a_source_that_is_silent(lab) -> None:
+    view = lab.window.review.manual
+    silent = CoilView(True, 0.3, 0.3, age=STALE + 1, read_age=STALE + 1)
+    view.render_snapshot(Snapshot(WindowState.READY, coil=silent, manual=True), None)
+    assert view.now.text() == "—" and "unknown" in view.force.text()
