@@ -47,10 +47,12 @@ class Records(QObject):
         self.shown: Source | None = None
         self._ended: RunSource | None = None
         self._awaited: Path | None = None
+        self._asked: Path | None = None
         self._read.connect(self._arrived)
 
     def open(self, folder: Path) -> None:
-        """Read a run, to be shown as soon as possible."""
+        """Read a run, to be shown as soon as possible, unless another is asked for."""
+        self._asked = folder
         self._load(folder, ended=False)
 
     def exchange(self, folder: Path) -> None:
@@ -76,6 +78,7 @@ class Records(QObject):
 
     def compare(self, chosen: Sequence[RunSummary]) -> None:
         """Read two or three runs, to be compared."""
+        self._asked = None
 
         def work() -> None:
             from gui.lanes.stored import RunSource
@@ -112,13 +115,13 @@ class Records(QObject):
         start(work, "open run", finishes=True)
 
     def _arrived(self, source: RunSource, ended: bool) -> None:
-        if not ended:
-            self.loaded.emit(source)
-        elif source.path == self._awaited:
-            self._ended = source
-        else:
+        if source.path != (self._awaited if ended else self._asked):
             source.close()
             return
+        if ended:
+            self._ended = source
+        else:
+            self.loaded.emit(source)
         folder = source.path
         # the model alone has one voltage for a whole run
         if source.sets_voltages or not source.has_sensor:

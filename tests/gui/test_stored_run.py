@@ -1,5 +1,8 @@
 """Runs on disk in the lanes: opened, looked at closely, exported."""
 
+import threading
+from pathlib import Path
+
 import numpy as np
 from full_disk import full_after
 from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
@@ -7,6 +10,7 @@ from PySide6.QtGui import QDropEvent
 from PySide6.QtSvg import QSvgRenderer
 
 from gui.dialogs.saving import table, write_scene, write_view
+from gui.lanes import stored
 from gui.session.steps import of_run
 from tactile_lab.report.from_run import read
 from tactile_lab.trace import Trace
@@ -33,6 +37,26 @@ def test_old_run_opens_in_the_same_lanes(lab) -> None:
     moved = run.trace("V_C2", 0.2004, 0.2014, 1000)
     closer = run.trace("V_C2", 0.2003, 0.2007, 1000)
     assert moved.time.size > 150 and closer.time.size > 60, "read around what is seen"
+
+
+def test_the_run_that_was_asked_for_last_is_shown(lab, monkeypatch) -> None:
+    """One that took longer to read came over it."""
+    slow, quick = lab.runs(2)
+    read, ready = stored.RunSource.__init__, threading.Event()
+
+    def slowly(source: stored.RunSource, path: Path) -> None:
+        if path == slow:
+            ready.wait(60)
+        read(source, path)
+
+    monkeypatch.setattr(stored.RunSource, "__init__", slowly)
+    lab.window.screen_.open_run(slow)
+    lab.window.screen_.open_run(quick)
+    lab.until(lambda: lab.session.opened == (quick.name,))
+    ready.set()
+    lab.until(lambda: not any(t.name == "open run" for t in threading.enumerate()))
+    lab.app.processEvents()
+    assert lab.session.opened == (quick.name,)
 
 
 def test_a_run_that_has_ended_is_looked_at_from_its_record(lab) -> None:
