@@ -25,7 +25,7 @@ COMPILED = (
     "rest_pair.py", "truncation.py", "threshold.py", "ellipse.py", "derived.py",
     "packed.py", "batch.py", "taylor.py", "elementary.py", "matrix.py",
     "scratch.py", "need.py",
-    "stretched_time.py", "magnus.py",
+    "stretched_time.py", "magnus.py", "lanes.py", "power_series.py",
 )  # fmt: skip
 """Every file that machine code is made from."""
 # wrappers for calls from Python or C would double the time to compile

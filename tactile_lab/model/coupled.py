@@ -83,6 +83,7 @@ from tactile_lab.model.pair import (
     STRETCH,
     TURN,
     V_END,
+    V_P_END,
     Y_END,
     collocated,
     end_inside,
@@ -91,6 +92,7 @@ from tactile_lab.model.pair import (
     series_room,
     shortened,
 )
+from tactile_lab.model.power_series import MOST, ROW, V_C1, V_C2
 from tactile_lab.model.scratch import borrowed, room_for
 from tactile_lab.model.spiking import (
     COUNT,
@@ -109,8 +111,6 @@ from tactile_lab.model.spiking import (
 from tactile_lab.model.stretched_time import pace_at
 from tactile_lab.model.tableau import ORDER
 from tactile_lab.model.taylor import (
-    MOST,
-    ROWS,
     degree_for,
     end_at,
     expanded,
@@ -120,8 +120,6 @@ from tactile_lab.model.taylor import (
     move,
     to_chebyshev,
 )
-from tactile_lab.model.taylor import V as OF_V_C2
-from tactile_lab.model.taylor import Y as OF_V_C1
 from tactile_lab.model.transistor import (
     A_BY_1,
     C2_BY_2,
@@ -138,7 +136,7 @@ FEW_UNITS = 4.0
 
 nodes_room, flow_room, step_room = room_for(2 * ORDER), room_for(FLOW), room_for(STEP)
 matrix_room, right_room = room_for(2 * ORDER, 2 * ORDER), room_for(2 * ORDER, COLUMNS)
-taylor_room = room_for(ROWS, MOST + 2)
+taylor_room = room_for(MOST + 2, ROW)
 
 
 @inner
@@ -208,6 +206,7 @@ def _build(stamp: int) -> Callable[..., Any]:
             low, above, bounded = min(y, v), 0.0, False
             high = max(y, par[V_S], v, par[V_RESET]) + par[V_T]
             s = carry = 0.0
+            V_P_s = V0
             if S[RESUME] == 0.0:
                 v = restart(B0, y, par, E, S, f)
             held = S[RESUME] >= 0.0
@@ -230,14 +229,14 @@ def _build(stamp: int) -> Callable[..., Any]:
                     break
                 wanted = max(SHARE * tolerance, 6e-16 * max(abs(y), abs(v)))
                 if not known:
-                    flow(B_at(V_P_at(s, V0, p, par[TAU]), par), y, v, held, par, f)
+                    flow(B_at(V_P_s, par), y, v, held, par, f)
                 known = True
                 rate = fastest(f)
                 degree = 0
                 stiff = stiff or short >= PATIENCE
                 if not stiff:
                     degree = expanded(
-                        s, room, y, v, held, V0, p, rate, wanted, full, par, f, g, c,
+                        room, y, v, held, V_P_s, p, rate, wanted, full, par, f, g, c,
                         step,
                     )  # fmt: skip
                     S[ITERATIONS] += 1.0
@@ -277,12 +276,12 @@ def _build(stamp: int) -> Callable[..., Any]:
                 x, whole, u = step[REACH], h, 2.0
                 if not held and (
                     degree == 0
-                    or highest(c[OF_V_C2], degree, x, step[V_END])
+                    or highest(c[:, V_C2], degree, x, step[V_END])
                     > par[V_FIRE] - 2.0 * inside
                 ):
                     S[SEARCHES] += 1.0
                     if degree:
-                        to_chebyshev(c[OF_V_C2], degree, x, part, b)
+                        to_chebyshev(c[:, V_C2], degree, x, part, b)
                     u, doubt = first_crossing(b, par[V_FIRE], inside, part, d)
                     if doubt:
                         S[DOUBT] = 1.0
@@ -290,7 +289,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     step[STAYS_1] = max(step[STAYS_1], step[LEFT_1])
                     step[STAYS_2] = max(step[STAYS_2], step[LEFT_2])
                     if degree:
-                        end_at(u * x, held, degree, par, c, g, step)
+                        end_at(u * x, held, V_P_s, p, degree, par, c, g, step)
                         h = step[LENGTH]
                     else:
                         end_inside(u, y, v, W, right, step)
@@ -321,7 +320,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     if keep_1:
                         if degree:
                             begins, length = in_time(
-                                c[OF_V_C1], degree, half, step, part, d
+                                c[:, V_C1], degree, half, step, part, d
                             )
                         else:
                             shortened(a, min(u, 1.0), part, d)
@@ -335,7 +334,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     if keep_2:
                         if degree:
                             begins, length = in_time(
-                                c[OF_V_C2], degree, half, step, part, d
+                                c[:, V_C2], degree, half, step, part, d
                             )
                         else:
                             shortened(b, min(u, 1.0), part, d)
@@ -361,6 +360,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                 following = s + (h + carry)
                 carry = (s - following) + (h + carry)
                 s = following
+                V_P_s = step[V_P_END] if degree else V_P_at(s, V0, p, par[TAU])
                 if held:
                     S[RESUME] -= h
                 # a series ends where `flow` was asked for, and the next one begins
@@ -368,7 +368,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                 if known:
                     f, g = g, f
                 if u <= 1.0:
-                    B = B_at(V_P_at(s, V0, p, par[TAU]), par)
+                    B = B_at(V_P_s, par)
                     if degree:
                         f, g = g, f
                     else:
@@ -405,6 +405,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     following = s + (carry + late)
                     carry = (s - following) + (carry + late)
                     s = following
+                    V_P_s = V_P_at(s, V0, p, par[TAU])
                     transform(E, 1.0, (g[TO_A] - f[TO_A]) / slope, 0.0, -1.0 / slope)
                     S[RESUME], v = par[T_EPS], par[V_FIRE]
                     last, tries, short, stiff = False, 0, 0, False
@@ -412,7 +413,7 @@ def _build(stamp: int) -> Callable[..., Any]:
                     s = T
                 h = h_next
                 if S[RESUME] == 0.0:
-                    v = restart(B_at(V_P_at(s, V0, p, par[TAU]), par), y, par, E, S, f)
+                    v = restart(B_at(V_P_s, par), y, par, E, S, f)
                     known, short, stiff = True, 0, False
             S[Y], S[VOLTAGE] = y, v
             if status != DONE:

@@ -34,19 +34,20 @@ from tactile_lab.model.transistor import (
 
 @inner
 def moved(
-    h: float, a: FloatArray, m: FloatArray, b: FloatArray, step: FloatArray
-) -> None:
-    """What a volt at the start moves at the end of h s: `flow` at start, middle, end.
+    first: float, middle: float, last: float, a: FloatArray, m: FloatArray,
+    b: FloatArray, step: FloatArray,
+) -> None:  # fmt: skip
+    """What a volt at the start moves at the end: a, m, b are `flow` there and between.
 
-    Magnus's exponential of order 4: of Simpson's mean of the Jacobians less h^2/12
-    times the first one's commutator with the last.
+    Magnus's exponential of order 4: of Simpson's sum of the Jacobians, of which the
+    weights are given, s, less three times the commutator of the first term with the
+    last.
     """
-    k = h / 6.0
-    p = k * (a[A_BY_1] + 4.0 * m[A_BY_1] + b[A_BY_1])
-    q = k * (a[A_BY_2] + 4.0 * m[A_BY_2] + b[A_BY_2])
-    r = k * (a[C2_BY_1] + 4.0 * m[C2_BY_1] + b[C2_BY_1])
-    s = k * (a[C2_BY_2] + 4.0 * m[C2_BY_2] + b[C2_BY_2])
-    k = h * h / 12.0
+    p = first * a[A_BY_1] + middle * m[A_BY_1] + last * b[A_BY_1]
+    q = first * a[A_BY_2] + middle * m[A_BY_2] + last * b[A_BY_2]
+    r = first * a[C2_BY_1] + middle * m[C2_BY_1] + last * b[C2_BY_1]
+    s = first * a[C2_BY_2] + middle * m[C2_BY_2] + last * b[C2_BY_2]
+    k = 3.0 * first * last
     turn = k * (a[A_BY_2] * b[C2_BY_1] - b[A_BY_2] * a[C2_BY_1])
     apart_a, apart_b = a[A_BY_1] - a[C2_BY_2], b[A_BY_1] - b[C2_BY_2]
     p, s = p - turn, s + turn
@@ -55,20 +56,17 @@ def moved(
     mean, half = 0.5 * (p + s), 0.5 * (p - s)
     square = half * half + q * r
     root = math.sqrt(abs(square))
-    if square > 0.0 and root > 300.0:
-        # the other eigenvalue has nothing left to say
-        even = 0.5 * math.exp(mean + root)
-        mean, odd = 0.0, even / root
-    elif root < 1e-3:
-        even, odd = 1.0 + 0.5 * square, 1.0 + square / 6.0
+    if root < 1e-3:
+        scale = math.exp(mean)
+        even, odd = scale * (1.0 + 0.5 * square), scale * (1.0 + square / 6.0)
     elif square > 0.0:
-        up = math.exp(root)
-        even, odd = 0.5 * (up + 1.0 / up), 0.5 * (up - 1.0 / up) / root
+        slow, fast = 0.5 * math.exp(mean + root), 0.5 * math.exp(mean - root)
+        even, odd = slow + fast, (slow - fast) / root
     else:
-        even, odd = math.cos(root), math.sin(root) / root
-    scale = math.exp(mean)
-    step[MOVED], step[MOVED + 1] = scale * (even + odd * half), scale * odd * q
-    step[MOVED + 2], step[MOVED + 3] = scale * odd * r, scale * (even - odd * half)
+        scale = math.exp(mean)
+        even, odd = scale * math.cos(root), scale * math.sin(root) / root
+    step[MOVED], step[MOVED + 1] = even + odd * half, odd * q
+    step[MOVED + 2], step[MOVED + 3] = odd * r, even - odd * half
 
 
 @inner
@@ -84,7 +82,7 @@ def rested(
         a[i] = b[i] = 0.0
     a[0], b[0] = y, v
     step[Y_END], step[V_END] = y, v
-    moved(h, f, f, f, step)
+    moved(h / 6.0, h / 1.5, h / 6.0, f, f, f, step)
     # Cramer's rule
     by_all = abs(f[A_BY_1] * f[C2_BY_2] - f[A_BY_2] * f[C2_BY_1])
     one, two = abs(f[TO_A]), abs(f[TO_C2])

@@ -40,9 +40,9 @@ COLUMNS = 3
 LENGTH, Y_END, V_END, LEFT_1, LEFT_2, STAYS_1, STAYS_2, GROWTH = range(8)
 """A step: its length, s; both voltages at its end, V; what they are wrong by within it
 and at its end, V; how much longer the next may be."""
-STRETCH, TURN, REACH, STIFF, TERMS = range(8, 13)
+STRETCH, TURN, REACH, STIFF, V_P_END = range(8, 13)
 """Where it is a power series: L and c of `stretched_time`, w at its end, whether it
-would not be stable farther, and the degree to which B is known in time."""
+would not be stable farther, and V_P at its end, V."""
 MOVED = 13
 """From here on, what a volt at the start moves at the end: V_C1 by V_C1, by V_C2, V_C2
 by V_C1, by V_C2."""
@@ -53,13 +53,16 @@ series_room = room_for(ORDER + 1)
 
 @inner
 def with_node_a(
-    B: float, Q: float, q: float, y: float, v: float, held: bool, par: FloatArray,
+    closing: float, held_back: float, y: float, v: float, held: bool, par: FloatArray,
     f: FloatArray,
 ) -> None:  # fmt: skip
-    """Add to T1's currents in `f` what Eqs. (16) and (18) have; Q is q - 1."""
-    f[OF_B], f[OF_Q] = B, Q
-    f[TO_A] += par[LAMBDA] * (par[DIVIDER] - y) + B * Q
-    f[A_BY_1] -= par[LAMBDA] + B * q / par[V_T]
+    """Add to T1's currents in `f` what Eqs. (16) and (18) have.
+
+    T2's current gives V_C1 the slope `closing` = `held_back` - B, V/s, with `held_back`
+    = B exp(-V_C1/V_T).
+    """
+    f[TO_A] += par[LAMBDA] * (par[DIVIDER] - y) + closing
+    f[A_BY_1] -= par[LAMBDA] + held_back / par[V_T]
     if held:
         f[TO_C2] = f[A_BY_2] = f[C2_BY_1] = f[C2_BY_2] = 0.0
     else:
@@ -94,7 +97,8 @@ def flow_near(
     else:
         Q = math.expm1(x)
         q = 1.0 + Q
-    with_node_a(B, Q, q, y, v, held, par, f)
+    f[OF_B], f[OF_Q] = B, Q
+    with_node_a(B * Q, B * q, y, v, held, par, f)
 
 
 @inner
@@ -296,30 +300,32 @@ def first_crossing(
             for n in range(ORDER + 1):
                 d[n] = a[n]
             d[0] -= level
-            part[0] = d[0] + series_at(d, ORDER, -1.0)
-            part[ORDER] = d[0] + series_at(d, ORDER, 1.0)
         else:
             for i in range(ORDER + 1):
                 x = 2.0 * (u + (top - u) * POINTS[i]) - 1.0
                 part[i] = (a[0] - level) + series_at(a, ORDER, x)
             to_series(part, d)
         size = steep = 0.0
+        first, last, sign = d[0], d[0], 1.0
         for n in range(1, ORDER + 1):
+            sign = -sign
+            first, last = first + sign * d[n], last + d[n]
             size += abs(d[n])
             if n > 1:
                 steep += n * n * abs(d[n])
         if d[0] + size >= -error:
             if steep < abs(d[1]):
-                if d[1] > 0.0 and part[ORDER] >= 0.0:
-                    return crossing(a, level, u, top, 1e-3 * error), doubt
-                if d[1] < 0.0 and part[0] >= -error:
+                if d[1] > 0.0 and last >= 0.0:
+                    u = crossing(a, level, u, top, first, last, 1e-3 * error)
+                    return u, doubt
+                if d[1] < 0.0 and first >= -error:
                     doubt = True
             elif size > error and width > 1e-12:
                 width *= 0.5
                 continue
             else:
                 doubt = True
-                if d[0] + size >= 0.0 and max(part[0], part[ORDER]) >= 0.0:
+                if d[0] + size >= 0.0 and max(first, last) >= 0.0:
                     return top, doubt
         u = top
         width = min(2.0 * width, 1.0 - u)

@@ -11,14 +11,14 @@ from tactile_lab.model.tableau import ORDER
 
 @inner
 def crossing(
-    a: FloatArray, level: float, low: float, high: float, enough: float
-) -> float:
-    """Where the series a, monotone on [low, high], passes `level` (Illinois' rule).
+    a: FloatArray, level: float, low: float, high: float, f_low: float, f_high: float,
+    enough: float,
+) -> float:  # fmt: skip
+    """Where the series a, monotone on [low, high], passes `level`.
 
-    It misses the level there by `enough`, or by rounding if that is more.
+    At both ends it is above it by `f_low` and `f_high`. It misses the level there by
+    `enough`, or by rounding if that is more. Anderson and Bjorck's false position.
     """
-    f_low = (a[0] - level) + series_at(a, ORDER, 2.0 * low - 1.0)
-    f_high = (a[0] - level) + series_at(a, ORDER, 2.0 * high - 1.0)
     u, last = high, 0.0
     for _ in range(100):
         if high - low <= 1e-16 or f_low == f_high:
@@ -27,13 +27,15 @@ def crossing(
         f = (a[0] - level) + series_at(a, ORDER, 2.0 * u - 1.0)
         if abs(f) <= enough:
             break
-        # an end that stays twice counts for half of what it is
-        half = 0.5 if f * last > 0.0 else 1.0
+        # an end that stays twice counts for less than it is
+        share = 1.0
+        if f * last > 0.0:
+            share = 1.0 - f / last if abs(f) < abs(last) else 0.5
         last = f
         if (f > 0.0) == (f_low > 0.0):
-            low, f_low, f_high = u, f, half * f_high
+            low, f_low, f_high = u, f, share * f_high
         else:
-            high, f_high, f_low = u, f, half * f_low
+            high, f_high, f_low = u, f, share * f_low
     return u
 
 
@@ -76,7 +78,9 @@ def above_threshold(
         if y0 < level:
             fires[1] = split
     else:
-        u = crossing(a, level, 0.0, split, 1e-16 * abs(level))
+        u = crossing(
+            a, level, 0.0, split, y0 - level, middle_y - level, 1e-16 * abs(level)
+        )
         if y0 < level:
             fires[1] = u
         else:
@@ -86,7 +90,9 @@ def above_threshold(
             if y1 < level:
                 fires[2] = split
         else:
-            u = crossing(a, level, split, 1.0, 1e-16 * abs(level))
+            u = crossing(
+                a, level, split, 1.0, middle_y - level, y1 - level, 1e-16 * abs(level)
+            )
             if y1 < level:
                 fires[2] = u
             else:

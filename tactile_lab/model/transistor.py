@@ -68,13 +68,14 @@ def currents(y: float, v: float, near: float, par: FloatArray, out: FloatArray) 
 
     `near` is what omega may be near, nothing if not known.
     """
-    X = math.expm1(min((v - y) / par[V_T], EXPONENT_CAP))
+    per_t = 1.0 / par[V_T]
+    X = math.exp(min((v - y) * per_t, EXPONENT_CAP)) - 1.0
     U = par[V_S] - y
     if par[DIRECT] != 0.0:
-        W = par[I_S1] * math.exp(min(U / par[V_T], 600.0))
+        W = par[I_S1] * math.exp(min(U * per_t, 600.0))
     else:
         J = par[I_S1] * X
-        z = (U + par[R_E] * J + par[E_DROP]) / par[V_T] + par[E_LOG]
+        z = (U + par[R_E] * J + par[E_DROP]) * per_t + par[E_LOG]
         W = omega_near(z, near)
     of_junctions(X, W, par, out)
 
