@@ -94,7 +94,10 @@ def _print(found: FittedRuns) -> None:
             "intervals hold noise, one code of offset of its channel, the clocks, and "
             "what the bench states of followers, lag, force and temperature"
             + (", each the same in all runs." if many else ".")
+            + " What is not fitted counts as exact."
         )
+        if "tau" in together.estimates and "V_GS" not in together.estimates:
+            say("A few uV of V_GS move tau by more than that: fit V_GS as well.")
     for text in found.warnings:
         warn(text)
 

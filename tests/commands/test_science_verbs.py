@@ -67,6 +67,8 @@ def test_identify_finds_the_bench_s_own_parameters(run_folder):
     assert V_GS and tau, said
     assert float(V_GS[1]) == pytest.approx(1.4, abs=5e-3)
     assert float(tau[1]) == pytest.approx(8.69, rel=0.1)
+    assert "What is not fitted counts as exact." in said and "fit V_GS" not in said
+    assert "fit V_GS as well" in call("identify", run_folder, "tau").stdout
 
 
 def test_what_a_run_holds_is_shown_as_json(run_folder):
