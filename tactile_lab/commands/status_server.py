@@ -24,6 +24,9 @@ from tactile_lab.errors import SceneError
 if TYPE_CHECKING:
     from tactile_lab.engine.execution import Execution
 
+NEWEST = ("begun", "state", "progress", "trial_started", "result")
+"""Events of which a program that comes late hears the newest."""
+
 UNREAD = 1 << 20
 """Bytes that may wait for a program before it is let go of."""
 
@@ -78,7 +81,7 @@ class StatusServer:
                 "another port, or 0 for a free one."
             ) from reason
         taken = self._server.sockets[0].getsockname()[1]
-        self.address = f"tcp://{host}:{taken}"
+        self.address = f"tcp://{f'[{host}]' if ':' in host else host}:{taken}"
         self.local = _is_loopback(host)
         self._thread = threading.Thread(
             target=self._loop.run_forever, name="status", daemon=True
@@ -121,7 +124,9 @@ class StatusServer:
         self._loop.close()
 
     def _send(self, told: dict[str, Any]) -> None:
-        if told["event"] in ("state", "progress", "trial_started", "result"):
+        if told["event"] == "begun":
+            self._newest.clear()  # of the run before
+        if told["event"] in NEWEST:
             self._newest[told["event"]] = told
         line = _line(told)
         for client in tuple(self._clients):

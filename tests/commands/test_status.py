@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -95,6 +96,31 @@ def test_who_comes_late_hears_the_newest_state_first(server):
             "elapsed_s": 1.0,
             "expected_s": 10.0,
         }
+
+
+def test_who_comes_late_hears_nothing_of_the_run_before(server):
+    """Of a sequence: the result of a run that ended came after the next one's state."""
+    server.begin(SimpleNamespace(documented={"event": "begun", "run": "a"}))
+    server(events.Progress(1.0, 10.0))
+    server.end({"run": "a"})
+    server.begin(SimpleNamespace(documented={"event": "begun", "run": "b"}))
+    server(events.StateChanged(events.RunState.RUNNING, ""))
+    with connected(server) as link:
+        lines = link.makefile()
+        told = [json.loads(next(lines)) for _ in range(2)]
+    assert [line["event"] for line in told] == ["begun", "state"]
+    assert told[0]["run"] == "b"
+
+
+def test_an_address_of_ipv6_is_told_as_one():
+    try:
+        served = StatusServer("tcp://[::1]:0", print)
+    except SceneError:
+        pytest.skip("this computer has no IPv6")
+    try:
+        assert served.address.startswith("tcp://[::1]:")
+    finally:
+        served.close()
 
 
 @pytest.mark.parametrize(
