@@ -72,13 +72,13 @@ def attached(*, ask: bool = True, ports: Iterable[str] = ()) -> list[dict[str, A
     """Serial ports and USB devices, as plain data.
 
     Args:
-        ask: send each USB serial adapter the harmless `*IDN?`, in every framing a
-            shipped row has.
-        ports: addresses to ask, whatever they are, instead of looking for ports.
+        ask: send each USB serial adapter, or each of `ports`, the harmless `*IDN?`, in
+            every framing a shipped row has.
+        ports: these addresses, whatever they are, instead of looking for ports.
     """
     chosen = tuple(ports)
     if chosen:
-        found = [_serial(address, "named by you", ask=True) for address in chosen]
+        found = [_serial(address, "named by you", ask=ask) for address in chosen]
     else:
         found = [
             replace(

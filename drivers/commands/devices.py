@@ -53,6 +53,8 @@ def command(
     if dialect is not None:
         if len(ports) != 1:
             fail("--dialect needs exactly one --port.", 2)
+        if no_ask:
+            fail("--dialect asks the instrument; leave out --no-ask.", 2)
         _try_out(ports[0], dialect, baud, transcript, as_json)
         return
     if transcript is not None or baud is not None:

@@ -22,6 +22,12 @@ def test_devices_tells_what_answers(tactile_lab, coil):
     assert found["fits"] == ["kepco-bop"] and found["identity"].startswith("KEPCO")
 
 
+def test_devices_sends_nothing_where_it_must_not_ask(tactile_lab, coil):
+    done = tactile_lab("devices", "--no-ask", "--port", coil, "--json")
+    (found,) = done.json["devices"]
+    assert found["identity"] is None and not found["fits"]
+
+
 def test_devices_tries_out_and_writes_the_transcript(tactile_lab, coil, tmp_path):
     path = tmp_path / "talk.txt"
     done = tactile_lab(
@@ -36,6 +42,7 @@ def test_devices_tries_out_and_writes_the_transcript(tactile_lab, coil, tmp_path
     ("arguments", "code", "why"),
     [
         (["--dialect", "kepco-bop"], 2, "exactly one --port"),
+        (["--port", "COIL", "--dialect", "kepco-bop", "--no-ask"], 2, "--no-ask"),
         (["--transcript", "x.txt"], 2, "need --dialect"),
         (["--port", "COIL", "--dialect", "kepko"], 2, "kepco-bop"),
         (["--port", "COIL", "--dialect", "keithley-2400"], 3, "Name the right row"),
