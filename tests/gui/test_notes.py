@@ -166,7 +166,7 @@ def test_a_missing_report_is_written_where_it_is_looked_for(
 
 
 def test_name_tags_and_notes_are_edited_on_the_card(lab) -> None:
-    window, folder = lab.window, lab.runs(1)[0]
+    window, folder = lab.window, lab.complete_run()  # 20 are listed, the newest first
     card = window.runs.card
     card.show_run(folder)
     lab.until(lambda: "complete" in card.texts["Log"].toPlainText())
@@ -250,7 +250,7 @@ def test_a_run_that_was_cut_short_is_recovered_in_the_window(lab) -> None:
 
 def test_a_deleted_run_is_gone_from_the_list(lab, monkeypatch) -> None:
     window = lab.window
-    source = lab.runs(1)[0]
+    source = lab.complete_run()
     copy = source.with_name(source.name + "_copy")
     shutil.copytree(source, copy)
     monkeypatch.setenv("XDG_DATA_HOME", str(lab.folder))
