@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -368,7 +368,8 @@ def _follow(folder: Path) -> None:
     from tactile_lab.lab import lab
 
     said = lab()
-    with working(f"after_run: {' '.join(said.after_run[:1])}"):
+    told = [f"after_run: {program}" for program in said.after_run[:1]]
+    with working(told[0]) if told else nullcontext():
         problem = said.follow(folder)
     if problem:
         warn(problem)

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import nullcontext
 
 import pytest
 
@@ -95,3 +96,14 @@ def test_what_follows_a_run_is_called_where_nobody_reads_on(
     assert done.code == 0
     assert followed == [*tmp_path.iterdir()]
     assert "the report was cut short" not in done.err
+
+
+def test_nothing_is_said_of_what_follows_where_nothing_does(
+    tactile_lab, tmp_path, monkeypatch
+):
+    """A terminal showed `after_run:  ...` after every run."""
+    said = []
+    shown = lambda text: said.append(text) or nullcontext()  # noqa: E731
+    monkeypatch.setattr("tactile_lab.commands.one_run.working", shown)
+    assert tactile_lab("run", *SHORT, "--no-report", "--out", tmp_path).code == 0
+    assert said == []
