@@ -111,6 +111,7 @@ from tactile_lab.model.spiking import (
 from tactile_lab.model.stretched_time import pace_at
 from tactile_lab.model.tableau import ORDER
 from tactile_lab.model.taylor import (
+    V_C2_at,
     degree_for,
     end_at,
     expanded,
@@ -118,6 +119,7 @@ from tactile_lab.model.taylor import (
     highest,
     in_time,
     move,
+    rising,
     to_chebyshev,
 )
 from tactile_lab.model.transistor import (
@@ -140,18 +142,13 @@ taylor_room = room_for(MOST + 2, ROW)
 
 
 @inner
-def restart(
-    B: float, y: float, par: FloatArray, E: FloatArray, S: FloatArray, f: FloatArray
-) -> float:
-    """End the reset: V_C2 = V_reset; an error in its time becomes one of V_C2.
+def restart(E: FloatArray, S: FloatArray, f: FloatArray) -> None:
+    """End the reset, after which `flow` is f: an error in its time becomes one of V_C2.
 
-    V_C1 goes on as before. Leaves `flow` after it in f.
+    V_C1 goes on as before.
     """
-    v: float = par[V_RESET]
-    flow(B, y, v, False, par, f)
     transform(E, 1.0, 0.0, 0.0, -f[TO_C2])
     S[RESUME] = -1.0
-    return v
 
 
 def _build(stamp: int) -> Callable[..., Any]:
@@ -208,7 +205,9 @@ def _build(stamp: int) -> Callable[..., Any]:
             s = carry = 0.0
             V_P_s = V0
             if S[RESUME] == 0.0:
-                v = restart(B0, y, par, E, S, f)
+                v = par[V_RESET]
+                flow(B0, y, v, False, par, f)
+                restart(E, S, f)
             held = S[RESUME] >= 0.0
             if held:
                 v = par[V_FIRE]
@@ -276,15 +275,19 @@ def _build(stamp: int) -> Callable[..., Any]:
                 x, whole, u = step[REACH], h, 2.0
                 if not held and (
                     degree == 0
-                    or highest(c[:, V_C2], degree, x, step[V_END])
-                    > par[V_FIRE] - 2.0 * inside
+                    or highest(c, degree, x, step[V_END]) > par[V_FIRE] - 2.0 * inside
                 ):
                     S[SEARCHES] += 1.0
+                    u = 0.0
                     if degree:
-                        to_chebyshev(c[:, V_C2], degree, x, part, b)
-                    u, doubt = first_crossing(b, par[V_FIRE], inside, part, d)
-                    if doubt:
-                        S[DOUBT] = 1.0
+                        near = 1e-3 * inside
+                        u = rising(c, degree, x, par[V_FIRE], step[V_END], near) / x
+                    if u == 0.0:
+                        if degree:
+                            to_chebyshev(c[:, V_C2], degree, x, part, b)
+                        u, doubt = first_crossing(b, par[V_FIRE], inside, part, d)
+                        if doubt:
+                            S[DOUBT] = 1.0
                 if u < 1.0:
                     step[STAYS_1] = max(step[STAYS_1], step[LEFT_1])
                     step[STAYS_2] = max(step[STAYS_2], step[LEFT_2])
@@ -368,12 +371,10 @@ def _build(stamp: int) -> Callable[..., Any]:
                 if known:
                     f, g = g, f
                 if u <= 1.0:
-                    B = B_at(V_P_s, par)
                     if degree:
                         f, g = g, f
                     else:
-                        flow(B, y, v, False, par, f)
-                    flow(B, y, v, True, par, g)
+                        flow(B_at(V_P_s, par), y, v, False, par, f)
                     # where it only grazes V_fire, the step is all that is known
                     slope = max(f[TO_C2], inside / h)
                     late = (par[V_FIRE] - v) / slope
@@ -381,9 +382,12 @@ def _build(stamp: int) -> Callable[..., Any]:
                     if degree:
                         whole = x * pace_at(u * x, step[STRETCH], step[TURN])
                     # does the series stay above V_fire by more than its error?
-                    x = 2.0 * u - 1.0 + 2.0 * min(max(2.0 * error / whole, 1e-7), 0.02)
-                    beyond = b[0] + series_at(b, ORDER, x) - par[V_FIRE]
-                    if beyond <= 0.0:
+                    u += min(max(2.0 * error / whole, 1e-7), 0.02)
+                    if degree:
+                        beyond = V_C2_at(c, degree, u * x)
+                    else:
+                        beyond = b[0] + series_at(b, ORDER, 2.0 * u - 1.0)
+                    if beyond <= par[V_FIRE]:
                         S[DOUBT] = 1.0
                     at = t + (s + (carry + late))
                     fire_before = S[LAST]
@@ -406,14 +410,23 @@ def _build(stamp: int) -> Callable[..., Any]:
                     carry = (s - following) + (carry + late)
                     s = following
                     V_P_s = V_P_at(s, V0, p, par[TAU])
+                    S[RESUME], v, held = par[T_EPS], par[V_RESET], par[T_EPS] > 0.0
+                    # node A is told the same of a collector that is kept at V_reset
+                    # and of one that goes on from there
+                    flow(B_at(V_P_s, par), y, v, held, par, g)
                     transform(E, 1.0, (g[TO_A] - f[TO_A]) / slope, 0.0, -1.0 / slope)
-                    S[RESUME], v = par[T_EPS], par[V_FIRE]
+                    f, g, known = g, f, True
                     last, tries, short, stiff = False, 0, 0, False
+                    if held:
+                        v = par[V_FIRE]
                 if last:
                     s = T
                 h = h_next
                 if S[RESUME] == 0.0:
-                    v = restart(B_at(V_P_s, par), y, par, E, S, f)
+                    if v != par[V_RESET]:
+                        v = par[V_RESET]
+                        flow(B_at(V_P_s, par), y, v, False, par, f)
+                    restart(E, S, f)
                     known, short, stiff = True, 0, False
             S[Y], S[VOLTAGE] = y, v
             if status != DONE:

@@ -121,6 +121,15 @@ def _spread(_: Any, lanes: Any, n: Any) -> Any:
     return _LANES(lanes, n), build
 
 
+@intrinsic
+def _negative(_: Any, lanes: Any) -> Any:
+    def build(_: Any, code: Any, _signature: Any, given: Any) -> Any:
+        zero = ir.Constant(FOUR, [0.0] * WIDTH)
+        return code.select(code.fcmp_ordered("<", given[0], zero), given[0], zero)
+
+    return _LANES(lanes), build
+
+
 load = cast(Callable[[FloatArray, int], Lanes], _load)
 """The four numbers of an array from the index on, a multiple of 4."""
 store = cast(Callable[[FloatArray, int, Lanes], None], _store)
@@ -133,3 +142,5 @@ same = cast(Callable[[float], Lanes], _same)
 """A number in all lanes."""
 spread = cast(Callable[[Lanes, int], Lanes], _spread)
 """What is in one lane, in all of them."""
+negative = cast(Callable[[Lanes], Lanes], _negative)
+"""What is below 0, and 0 in the place of the rest."""

@@ -11,7 +11,7 @@ import math
 from tactile_lab.arrays import FloatArray
 from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import to_series
-from tactile_lab.model.lanes import apart
+from tactile_lab.model.lanes import apart, load, negative, same
 from tactile_lab.model.magnus import moved
 from tactile_lab.model.node_a import TAU, B_at, V_P_at
 from tactile_lab.model.pair import (
@@ -35,6 +35,7 @@ from tactile_lab.model.power_series import (
     FADES,
     FOURS,
     MOST,
+    ROW,
     SLOPES,
     V_C1,
     V_C2,
@@ -95,17 +96,61 @@ def reached(c: FloatArray, degree: int, wanted: float) -> tuple[float, bool]:
 
 
 @inner
-def highest(row: FloatArray, degree: int, x: float, end: float) -> float:
-    """What the series does not exceed up to w = x, where it is `end`.
+def down(c: FloatArray, first: int, row: int, degree: int, x: float) -> float:
+    """Sum of the terms below 0 of V_C2 or its slope at w = x, from `row` on.
+
+    Over w^row: `first` tells which of the two, as `power_series` has them.
+    """
+    top, square = ROW * (degree - (degree - row) % 2) + first, same(x * x)
+    even, odd = negative(load(c, top)), negative(load(c, top + ROW))
+    for n in range(top - 2 * ROW, ROW * row + first - 1, -2 * ROW):
+        even = negative(load(c, n)) + even * square
+        odd = negative(load(c, n + ROW)) + odd * square
+    return apart(even + odd * same(x))[1]
+
+
+@inner
+def highest(c: FloatArray, degree: int, x: float, end: float) -> float:
+    """What V_C2 does not exceed up to w = x, where it is `end`.
 
     Above the chord between both lie only the terms that curve it down.
     """
-    top, square = degree - degree % 2, x * x
-    even, odd = min(row[top], 0.0), min(row[top + 1], 0.0)
-    for k in range(top - 2, 0, -2):
-        even = even * square + min(row[k], 0.0)
-        odd = odd * square + min(row[k + 1], 0.0)
-    return float(max(row[0], end) - (even + x * odd) * square)
+    return float(max(c[0, V_C2], end) - down(c, VOLTAGES, 2, degree, x) * x * x)
+
+
+@inner
+def V_C2_at(c: FloatArray, degree: int, w: float) -> float:
+    """V_C2 at w, V."""
+    return apart(four_at(c, VOLTAGES, degree, w))[1]
+
+
+@inner
+def rising(
+    c: FloatArray, degree: int, x: float, level: float, end: float, enough: float
+) -> float:  # fmt: skip
+    """The w at which V_C2 rises through `level`, to within `enough` V, 2 for nowhere.
+
+    It is `end` at w = x. 0 where its terms do not prove that it rises all the way.
+    """
+    start, slope = c[0, V_C2], c[0, SLOPES + 1]
+    if start >= level or slope + down(c, SLOPES, 1, degree, x) * x <= 0.0:
+        return 0.0
+    if end < level:
+        return 2.0
+    low, high = 0.0, x
+    w: float = x * (level - start) / (end - start)
+    for _ in range(100):
+        above = V_C2_at(c, degree, w) - level
+        if abs(above) <= enough or high - low <= 1e-16 * x:
+            break
+        if above > 0.0:
+            high = w
+        else:
+            low = w
+        w -= above / apart(four_at(c, SLOPES, degree, w))[1]
+        if not low < w < high:
+            w = 0.5 * (low + high)
+    return w
 
 
 @inner

@@ -7,7 +7,15 @@ import pytest
 from numba import njit
 
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.lanes import apart, load, same, side_by_side, spread, store
+from tactile_lab.model.lanes import (
+    apart,
+    load,
+    negative,
+    same,
+    side_by_side,
+    spread,
+    store,
+)
 from tactile_lab.model.node_a import B_at
 from tactile_lab.model.packed import parameters
 from tactile_lab.model.pair import flow
@@ -16,12 +24,14 @@ from tactile_lab.model.power_series import (
     MOST,
     ROW,
     SLOPES,
+    V_C2,
     VOLTAGES,
     expand,
     four_at,
 )
 from tactile_lab.model.scratch import room_for
 from tactile_lab.model.stretched_time import pace_at, time_at
+from tactile_lab.model.taylor import highest, rising
 from tactile_lab.model.transistor import FLOW, OF_W, OF_X, TO_A, TO_C2
 
 DEGREE, RATE, L, TURN = 30, 700.0, 2e-3, 0.2
@@ -36,6 +46,27 @@ def reckoned(a, b):
     one, two = side_by_side(*a), side_by_side(*b)
     store(four, 0, one - two)
     return apart(one + two * same(3.0)), apart(spread(one, 2) * load(four, 0))
+
+
+@njit
+def below_0(a):
+    return apart(negative(side_by_side(*a)))
+
+
+@njit
+def told(of_V_C2, x, level):
+    c = series_room()
+    degree = of_V_C2.size - 1
+    for k in range(degree + 2):
+        for n in range(ROW):
+            c[k, n] = 0.0
+    end = 0.0
+    for k in range(degree, -1, -1):
+        c[k, V_C2] = of_V_C2[k]
+        end = end * x + of_V_C2[k]
+        if k:
+            c[k - 1, SLOPES + 1] = k * of_V_C2[k]
+    return rising(c, degree, x, level, end, 1e-15), highest(c, degree, x, end)
 
 
 @njit
@@ -86,3 +117,37 @@ def test_series_are_of_what_the_equations_say(circuit, V_C1, V_C2, V_P, w):
     assert fades == pytest.approx(math.exp(-RATE * t), rel=1e-9)
     # both have moved, or nothing would be shown
     assert abs(v - V_C2) + abs(y - V_C1) > 0.2 * circuit.V_T
+
+
+def test_of_four_lanes_what_is_below_0_is_left():
+    assert below_0((1.0, -2.0, 0.0, -0.5)) == (0.0, -2.0, 0.0, -0.5)
+
+
+@pytest.mark.parametrize("degree", [3, 4, 11, 12])
+def test_a_crossing_is_where_a_series_that_rises_meets_the_level(degree):
+    rng = np.random.default_rng(degree)
+    for _ in range(50):
+        series = rng.normal(size=degree + 1)
+        x = rng.uniform(0.1, 0.9)
+        w = np.linspace(0.0, x, 2001)
+        values = np.polynomial.polynomial.polyval(w, series)
+        level = rng.uniform(values.min(), values.max())
+        found, bound = told(series, x, level)
+        assert values.max() <= bound + 1e-12
+        if found == 0.0:
+            continue  # not proven; some other way is taken
+        assert np.all(np.diff(values) > 0.0), "only what rises is answered"
+        if values[-1] < level:
+            assert found == 2.0
+        else:
+            there = np.polynomial.polynomial.polyval(found, series)
+            assert there == pytest.approx(level, abs=1e-12)
+
+
+def test_that_a_series_rises_is_told_of_those_that_do():
+    series = np.array([1.0, 2.0, 0.5, -0.1, 0.02])
+    found, _ = told(series, 0.8, 2.0)
+    assert np.polynomial.polynomial.polyval(found, series) == pytest.approx(2.0)
+    assert told(series, 0.8, 3.5)[0] == 2.0
+    assert told(np.array([1.0, 2.0, -5.0]), 0.8, 1.1)[0] == 0.0
+    assert told(series, 0.8, 0.9)[0] == 0.0, "it begins above the level"
