@@ -67,11 +67,6 @@ def inner(function: F) -> F:
     return cast(F, njit(**_INNER | _LENT)(function))
 
 
-def fused(function: F) -> F:
-    """As `inner`, where a product may stay unrounded until it is added to something."""
-    return cast(F, njit(**_INNER | _LENT, fastmath={"contract"})(function))
-
-
 def inner_making_arrays(function: F) -> F:
     """The same for a function that makes arrays or returns one."""
     return cast(F, njit(**_INNER)(function))
@@ -83,13 +78,6 @@ def entry(function: F) -> F:
     Where no folder can be written it is compiled in every process, which is said.
     """
     return cast(F, kept(function, error_model="numpy", nogil=True))
-
-
-def fused_entry(function: F) -> F:
-    """The same, with products as in `fused`."""
-    return cast(
-        F, kept(function, error_model="numpy", nogil=True, fastmath={"contract"})
-    )
 
 
 def source_stamp(*more: Path) -> int:

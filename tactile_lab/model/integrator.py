@@ -10,7 +10,7 @@ import math
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.model import elementary
-from tactile_lab.model.compiled import fused, inner
+from tactile_lab.model.compiled import inner
 from tactile_lab.model.matrix import product_of
 from tactile_lab.model.node_a import V_T
 from tactile_lab.model.tableau import ORDER, TO_SERIES_TURNED
@@ -53,7 +53,7 @@ def omega(z: float) -> float:
     return w
 
 
-@fused
+@inner
 def omega_near(z: float, w: float) -> float:
     """Omega of z from w, which is near it: one iteration where that is enough."""
     if z <= 20.0 or not 0.5 * z < w < z:

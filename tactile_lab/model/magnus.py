@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.model.compiled import fused
+from tactile_lab.model.compiled import inner
 from tactile_lab.model.pair import (
     GROWTH,
     LEFT_1,
@@ -32,7 +32,7 @@ from tactile_lab.model.transistor import (
 )
 
 
-@fused
+@inner
 def moved(
     first: float, middle: float, last: float, a: FloatArray, m: FloatArray,
     b: FloatArray, step: FloatArray,
@@ -69,7 +69,7 @@ def moved(
     step[MOVED + 2], step[MOVED + 3] = odd * r, even - odd * half
 
 
-@fused
+@inner
 def rested(
     h: float, y: float, v: float, f: FloatArray, a: FloatArray, b: FloatArray,
     step: FloatArray,

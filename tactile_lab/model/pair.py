@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.model.compiled import fused, inner
+from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import TAU_L, V_RESET, series_at, to_series
 from tactile_lab.model.node_a import DIVIDER, LAMBDA, TAU, V_T, B_at, V_P_at
 from tactile_lab.model.scratch import room_for
@@ -51,7 +51,7 @@ STEP = 17
 series_room = room_for(ORDER + 1)
 
 
-@fused
+@inner
 def with_node_a(
     closing: float, held_back: float, y: float, v: float, held: bool, par: FloatArray,
     f: FloatArray,
@@ -70,7 +70,7 @@ def with_node_a(
         f[C2_BY_2] -= 1.0 / par[TAU_L]
 
 
-@fused
+@inner
 def flow(
     B: float, y: float, v: float, held: bool, par: FloatArray, f: FloatArray
 ) -> None:
@@ -81,7 +81,7 @@ def flow(
     flow_near(B, y, v, 0.0, held, par, f)
 
 
-@fused
+@inner
 def flow_near(
     B: float, y: float, v: float, near: float, held: bool, par: FloatArray,
     f: FloatArray,

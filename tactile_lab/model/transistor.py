@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.model.compiled import fused
+from tactile_lab.model.compiled import inner
 from tactile_lab.model.integrator import DIRECT, PARAMETERS, V_S, omega_near
 from tactile_lab.model.node_a import V_T
 
@@ -34,7 +34,7 @@ FLOW = 10
 """Numbers of a flow."""
 
 
-@fused
+@inner
 def of_junctions(X: float, W: float, par: FloatArray, out: FloatArray) -> None:
     """Fill `out` from the collector junction's state X and the emitter junction's W.
 
@@ -62,7 +62,7 @@ def of_junctions(X: float, W: float, par: FloatArray, out: FloatArray) -> None:
     out[C2_BY_2] = (F_v - J_v * J_2) * per_2
 
 
-@fused
+@inner
 def currents(y: float, v: float, near: float, par: FloatArray, out: FloatArray) -> None:
     """Fill `out` at V_C1 = y, V_C2 = v with the junctions' state and `of_junctions`.
 
@@ -80,7 +80,7 @@ def currents(y: float, v: float, near: float, par: FloatArray, out: FloatArray) 
     of_junctions(X, W, par, out)
 
 
-@fused
+@inner
 def reach(low: float, fastest: float, par: FloatArray) -> float:
     """What V_C2 - V_C1 cannot rise above, V: there C2 loses more than all that comes.
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import SolverError
-from tactile_lab.model.compiled import fused, fused_entry, source_stamp
+from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import T_EPS, TAU_L, V_FIRE, V_RESET, Q_at
 from tactile_lab.model.node_a import LAMBDA, PER_VOLT, TAU, V_T, B_at, V_P_at, slope_at
 from tactile_lab.model.scratch import borrowed
@@ -33,7 +33,7 @@ from tactile_lab.validation.rivals import (
 )
 
 
-@fused
+@inner
 def next_V_C1(
     s: float, h: float, y: float, V0: float, p: float, par: FloatArray
 ) -> float:
@@ -50,7 +50,7 @@ def next_V_C1(
     return float(y + h * one * slope_at(B, y, par) + h * h * two * grows)
 
 
-@fused
+@inner
 def rise_time(v: float, Q: float, slope: float, d: float, par: FloatArray) -> float:
     """When V_C2 reaches V_fire from v under a current Q + slope t, d s at most."""
     tau = par[TAU_L]
@@ -75,7 +75,7 @@ def rise_time(v: float, Q: float, slope: float, d: float, par: FloatArray) -> fl
 
 
 def _build(stamp: int) -> Callable[..., Any]:
-    @fused_entry
+    @entry
     def run(
         segments: FloatArray, y: float, v: float, par: FloatArray, dt: float
     ) -> tuple[int, FloatArray, float, int]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import SolverError
-from tactile_lab.model.compiled import fused, fused_entry, source_stamp
+from tactile_lab.model.compiled import entry, inner, source_stamp
 from tactile_lab.model.integrator import T_EPS, TAU_L, V_FIRE, V_RESET, Q_at, Q_gain
 from tactile_lab.model.node_a import LAMBDA, PER_VOLT, TAU, V_T, B_at, V_P_at, slope_at
 from tactile_lab.model.pair import flow
@@ -46,7 +46,7 @@ stages_room, dense_room, pair_room = room_for(8, 2), room_for(5, 2), room_for(2)
 flow_room, jacobian_room = room_for(FLOW), room_for(FLOW + 1)
 
 
-@fused
+@inner
 def jacobian(
     s: float, y: float, v: float, V0: float, p: float, held: bool, par: FloatArray,
     J: FloatArray,
@@ -68,7 +68,7 @@ def jacobian(
     J[FLOW] = B * par[PER_VOLT] * (p - V_P / par[TAU]) * math.expm1(-y / par[V_T])
 
 
-@fused
+@inner
 def step_explicit(
     s: float, h: float, y: float, v: float, V0: float, p: float, held: bool,
     par: FloatArray, both: FloatArray, k: FloatArray, dense: FloatArray,
@@ -97,7 +97,7 @@ def step_explicit(
     return 6
 
 
-@fused
+@inner
 def step_rosenbrock(
     s: float, h: float, y: float, v: float, V0: float, p: float, held: bool,
     par: FloatArray, both: FloatArray, k: FloatArray, dense: FloatArray,
@@ -139,7 +139,7 @@ def step_rosenbrock(
     return 8
 
 
-@fused
+@inner
 def dense_at(method: int, dense: FloatArray, c: int, u: float) -> float:
     """The step's dense output at the fraction u."""
     one = 1.0 - u
@@ -152,7 +152,7 @@ def dense_at(method: int, dense: FloatArray, c: int, u: float) -> float:
     return float(dense[0, c] + u * (dense[1, c] + one * inside))
 
 
-@fused
+@inner
 def located(method: int, dense: FloatArray, level: float) -> float:
     """The fraction of the step at which V_C2 passes `level`, by Illinois' rule."""
     low, high = 0.0, 1.0
@@ -177,7 +177,7 @@ def located(method: int, dense: FloatArray, level: float) -> float:
 
 
 def _build_adaptive(stamp: int) -> Callable[..., Any]:
-    @fused_entry
+    @entry
     def run(
         method: int, segments: FloatArray, y: float, v: float, par: FloatArray,
         tolerance: float, most: float,
@@ -256,7 +256,7 @@ def _build_adaptive(stamp: int) -> Callable[..., Any]:
 
 
 def _build_fixed(stamp: int) -> Callable[..., Any]:
-    @fused_entry
+    @entry
     def run(
         order: int, events: int, segments: FloatArray, y: float, v: float,
         par: FloatArray, dt: float,
@@ -320,7 +320,7 @@ def _build_fixed(stamp: int) -> Callable[..., Any]:
     return run
 
 
-@fused
+@inner
 def hermite(a: float, b: float, da: float, db: float, u: float) -> float:
     """The cubic through a and b with slopes da and db per step, at the fraction u."""
     one = 1.0 - u
@@ -329,7 +329,7 @@ def hermite(a: float, b: float, da: float, db: float, u: float) -> float:
     )
 
 
-@fused
+@inner
 def hermite_root(a: float, b: float, da: float, db: float, par: FloatArray) -> float:
     """Where the cubic passes V_fire, by bisection."""
     low, high = 0.0, 1.0
