@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from lane_stack import stack
 from PySide6.QtCore import QEvent
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 from served_source import Source
 
 from gui.app import application, begin
@@ -80,12 +80,9 @@ class Lab:
         session, window = self.session, self.window
         while session.queue.items:
             session.queue.remove(session.queue.items[0])
-        while (popup := QApplication.activePopupWidget()) is not None:
-            popup.close()
         for overlay in window.findChildren(Overlay):
             overlay.hide()
-        window.activateWindow()  # another test may have had a window of its own
-        self.until(window.isActiveWindow)
+        self.until(self.in_front)  # another test may have had a window of its own
         if session.busy:
             session.stop("test is over")
         session.show_monitor(False)
@@ -104,6 +101,23 @@ class Lab:
             self.until(lambda: session.plan.expectation is not None)
             self.texts = window.setup.form.texts()
         window.setup.plan_now()
+
+    def in_front(self) -> bool:
+        """Whether the window is the active one; what lies over it is closed.
+
+        A focus that comes while a popup is open Qt gives to the window and does not
+        call it active, and then takes no request for it, as it has the focus:
+        another window has to have it in between.
+        """
+        while (popup := QApplication.activePopupWidget()) is not None:
+            popup.close()
+        if self.window.isActiveWindow():
+            return True
+        between = QWidget()
+        between.show()
+        self.window.activateWindow()
+        self.app.processEvents()
+        return self.window.isActiveWindow()
 
     def run(self) -> None:
         """Start a run of an hour and wait until the coil is live."""

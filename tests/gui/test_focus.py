@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QMenu, QWidget
 
 LEAST = 3.0
 """Contrast of what a focus ring changes (WCAG 2.2, 1.4.11 and 2.4.13)."""
@@ -76,3 +76,23 @@ def test_focus_is_seen_on_every_control(lab, theme: str) -> None:
     finally:
         window.theme.choose("light")
         window.review.show_tab(0)
+
+
+def test_the_next_test_has_the_window_whatever_was_open_as_it_was_asked_for(
+    lab,
+) -> None:
+    """A focus beside a popup is the window's and does not make it active."""
+    aside = QWidget()
+    aside.show()
+    lab.until(aside.isActiveWindow)
+    popup = QMenu(aside)
+    popup.addAction("Over the window")
+    popup.popup(QPoint(0, 0))
+    lab.until(popup.isVisible)
+    lab.window.activateWindow()
+    front = lab.window.windowHandle()
+    lab.until(lambda: lab.app.focusWindow() is front)
+    popup.close()
+    assert not lab.window.isActiveWindow(), "Qt asks no more"
+    lab.ready()
+    assert lab.window.isActiveWindow()
