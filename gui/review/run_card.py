@@ -75,7 +75,7 @@ class RunCard(QFrame):
         kind = {True: "sim", False: "bench", None: "?"}[entry.simulated]
         length = "—" if entry.duration is None else minutes(entry.duration)
         when = f"{day(entry.started)} · {length} · {kind}"
-        self._signs = [QLabel(), QLabel()]
+        self._signs = [QLabel(self), QLabel(self)]  # without, one shown is a window
         self._signs[0].setToolTip("On screen")
         self._signs[1].setToolTip("\n".join(entry.notes))
         self._signs[1].setVisible(bool(entry.notes))

@@ -83,6 +83,22 @@ def test_a_run_that_the_search_hides_is_no_longer_chosen(runs: RunsView) -> None
     assert "No run fits" in texts(runs)
 
 
+def test_a_run_with_notes_does_not_take_the_keyboard(
+    app: QApplication, runs: RunsView, qtbot
+) -> None:
+    """A sign of its card was shown as a window, at the end of each run."""
+    runs.show()
+    runs.activateWindow()
+    qtbot.waitUntil(runs.isActiveWindow)
+    went: list[object] = []
+    app.focusWindowChanged.connect(went.append)
+    runs.show_entries(ENTRIES[:2])
+    app.processEvents()
+    app.focusWindowChanged.disconnect(went.append)
+    runs.hide()
+    assert not went
+
+
 def test_an_empty_folder_says_what_comes(app: QApplication) -> None:
     assert "No runs yet" in texts(RunsView(Theme("light")))
 
