@@ -83,7 +83,8 @@ class Form(QWidget):
         self.values: list[FieldText] = []
         self.fields: list[Field] = []
         self._folded = folded
-        self.setVisible(not folded)
+        if folded:
+            self.hide()
         self.edits = Edits() if edits is None else edits
         self.protocol: type[Protocol] | None = None
         self._shown: dict[str, str] = {}

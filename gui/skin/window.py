@@ -108,12 +108,14 @@ class SkinWindow(QWidget):
         self.when, self.numbers = label("", "value"), Elided("", "muted")
         self.when.setMinimumWidth(150)
         self.warning = label(" ".join(warnings), "warning", wrap=True)
-        self.warning.setVisible(bool(warnings))
+        if not warnings:
+            self.warning.hide()
         about = f"{skin.array.size:,} taxels · {show(skin.duration, 's')} · simulated"
         both = QSplitter(Qt.Orientation.Horizontal)
         left = QWidget()
         self.marks = label(marked(skin.array), "muted", wrap=True)
-        self.marks.setVisible(bool(self.marks.text()))
+        if not self.marks.text():
+            self.marks.hide()
         column(left, (self.map, 1), self.marks)
         both.addWidget(left)
         both.addWidget(self.raster)

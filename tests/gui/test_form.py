@@ -54,6 +54,11 @@ def test_every_protocol_has_a_form_of_its_defaults(
     assert again.protocol.model_dump() == plain.protocol.model_dump()
 
 
+def test_a_form_is_no_window_before_it_has_its_place(app: QApplication) -> None:
+    """One flashed up for each form of a page, and took the keyboard."""
+    assert not Form().isVisible()
+
+
 def test_fields_are_named_as_one_speaks_of_them(app: QApplication) -> None:
     """Lasts, Most and Count say nothing; a switch is true, as in its file."""
     titles = {

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QWindow
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog
 from shiboken6 import isValid
@@ -92,8 +93,11 @@ def test_dead_and_stuck_taxels_are_marked_and_told(lab, tmp_path, theme):
     asked = asked.replace("100 Hz", "1 kHz")
     (tmp_path / "ball.toml").write_text(asked)
     lab.window.theme.choose(theme)
+    went: list[QWindow] = []
+    lab.app.focusWindowChanged.connect(went.append)
     try:
         window = shown(lab, tmp_path / "ball.toml", tmp_path)
+        assert {*went} == {window.windowHandle()}, "no part of it is a window before"
         assert window.marks.text() == (
             "✕ dead (2) · ▢ stuck (1), left out of full colour"
         )
@@ -109,6 +113,7 @@ def test_dead_and_stuck_taxels_are_marked_and_told(lab, tmp_path, theme):
         assert not np.isnan(image[which == 3]).any()
         window.close()
     finally:
+        lab.app.focusWindowChanged.disconnect(went.append)
         lab.window.theme.choose("light")
 
 
