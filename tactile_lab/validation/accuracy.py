@@ -17,6 +17,7 @@ from tactile_lab.validation.contest import (
     CAPPED,
     COMPILED,
     OURS,
+    SPAN,
     TIMED_OUT,
     Row,
     contest,
@@ -129,9 +130,10 @@ def report(scenes: Sequence[Problem], rows: Sequence[Row], cap: float) -> str:
         f"{'' if called else ' --compiled'} --out docs`.\n",
         "Errors are the largest true error of any spike time and that of V_C1 at the "
         "end, against a 40-digit reference. Times are CPU time of a call from a "
-        "script, the least of several, interleaved in one process (ngspice in its "
-        "own), so that other work on the machine, which the load average tells of, "
-        "lengthens all of them alike: trust ratios more than times. The cap is "
+        f"script: the mean of {1e3 * SPAN:g} ms of calls in a row, the least of "
+        "several, interleaved in one process (ngspice in its own), so that other work "
+        "on the machine, which the load average tells of, lengthens all of them alike: "
+        "trust ratios more than times. The cap is "
         f"{cap:g} s{CAPPED}. A wrong count, NaN, failure or time-out is shown as "
         "such.\n",
         '"Compiled" methods are machine code from end to end, as ours is: Dormand and '

@@ -105,7 +105,7 @@ def _judged(
         return judge(problem, method, truth, cap)
 
     def last_only(given: Problem, cap: float) -> Any:
-        answer = method.solve(given, cap=cap)
+        answer = method.answer(method.solve(given, cap=cap))
         if answer.spike_times.size != at:
             return answer._replace(spike_times=np.zeros(2))
         return answer._replace(spike_times=answer.spike_times[-1:])
