@@ -87,12 +87,13 @@ def fit_transfer(
         use &= (volts <= SUBTHRESHOLD_END) & ~(bent & _flat(volts, amperes, floor))
     x, y = volts[use], np.log(amperes[use])
     if x.size < FEWEST:
-        raise NotIdentifiableError(
-            f"{x.size} points lie in the subthreshold regime, {FEWEST} are needed"
-        )
+        raise NotIdentifiableError(_too_few(int(x.size), volts, between))
     line = Line.through(x, y) if np.ptp(x) > 0 else None
     if line is None or line.slope.value <= 0:
-        raise NotIdentifiableError("I_DS does not rise with V_GS")
+        raise NotIdentifiableError(
+            f"I_DS does not rise with V_GS in the {x.size} points fitted: check which "
+            "column is which, or fit another range (--between)"
+        )
     log_I_S, steep = line.offset, line.slope
     I_S = math.exp(log_I_S.value)
     return Transfer(
@@ -105,6 +106,22 @@ def fit_transfer(
         points=int(x.size),
         range=(float(x.min()), float(x.max())),
         scatter=line.scatter,
+    )
+
+
+def _too_few(
+    usable: int, volts: FloatArray, between: tuple[float, float] | None
+) -> str:
+    """How many points can be fitted, of which, and how to have more."""
+    where = f"up to {SUBTHRESHOLD_END:g} V and above the leakage"
+    remedy = "Measure in finer steps of V_GS there"
+    if between is not None:
+        where = f"between {between[0]:g} V and {between[1]:g} V"
+        low, high = (volts.min(), volts.max()) if volts.size else (0.0, 0.0)
+        remedy += f", or widen --between; the curve goes from {low:g} V to {high:g} V"
+    return (
+        f"{usable} of {volts.size} points can be fitted, {where} and with a current "
+        f"over 0 A; {FEWEST} are needed. {remedy}."
     )
 
 

@@ -69,8 +69,22 @@ def test_rows_without_a_number_are_left_out_and_named(tmp_path):
         read_transfer(path)
 
 
+def test_a_curve_with_too_few_points_is_told_what_to_measure():
+    """ "5 points lie in the subthreshold regime, 6 are needed" left a person alone."""
+    with pytest.raises(NotIdentifiableError) as refused:
+        fit_transfer(V[:5], curve()[:5])
+    said = str(refused.value)
+    assert "5 of 5 points" in said and "6 are needed" in said
+    assert "finer steps of V_GS" in said and "up to 2.75 V" in said
+    with pytest.raises(NotIdentifiableError) as refused:
+        fit_transfer(V, curve(), between=(1.0, 1.1))
+    said = str(refused.value)
+    assert "3 of 71 points" in said and "between 1 V and 1.1 V" in said
+    assert "--between" in said and "0 V to 3.5 V" in said
+
+
 def test_unusable_curves_are_refused():
-    with pytest.raises(NotIdentifiableError, match="5 points"):
+    with pytest.raises(NotIdentifiableError, match="5 of 5 points"):
         fit_transfer(V[:5], curve()[:5])
     with pytest.raises(NotIdentifiableError, match="does not rise"):
         fit_transfer(V, curve()[::-1], between=(0, 2))
