@@ -25,6 +25,7 @@ class NoForce(Protocol):
     name: ClassVar[str] = "monitor"
     title: ClassVar[str] = "Monitor"
     signals: ClassVar[tuple[str, ...]] = ("V_C1", "V_C2", "V_K", "spikes")
+    counts: ClassVar[bool] = False
 
     duration: Duration = Field(default=600.0, description="Ends by itself after this")
     part: Duration = Field(default=10.0, description="Length of one trial")

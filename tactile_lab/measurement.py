@@ -31,7 +31,10 @@ if TYPE_CHECKING:
 
 
 CUT_OFF = "spikes could not be told all of the time: their channel left its range"
-"""Why a trial has no latency, rate or fit."""
+BETWEEN_SAMPLES = "spikes are missed: one fits between two samples of V_K"
+"""Why a trial has no latency, rate or fit: its spikes are not all counted."""
+DAGGER = "†"
+"""Behind a number of spikes that are not all counted."""
 NOT_HELD = "no one force is held"
 """Why a trial has no adaptation: without a level its force changes all the time."""
 
@@ -98,8 +101,8 @@ class MeasuredTrial:
             the part of its hold that was held.
         clock_uncertainty: bound on how far spike times lie from the coil's, s: how well
             the scope's clock is aligned with the host's; None if not known.
-        unsearched: whether its spikes could not be told all of the time, their channel
-            cut off: they are counted, and no latency, rate or fit is told.
+        uncounted: why its spikes are not all counted, `CUT_OFF` or `BETWEEN_SAMPLES`:
+            those seen are told, and no latency, rate or fit. "" where all are.
     """
 
     label: str
@@ -114,7 +117,7 @@ class MeasuredTrial:
     drift: float | None = None
     complete: bool = True
     clock_uncertainty: float | None = None
-    unsearched: bool = False
+    uncounted: str = ""
 
     @property
     def held(self) -> tuple[float, float] | None:
@@ -127,7 +130,12 @@ class MeasuredTrial:
     def response(self) -> Response:
         """Its spikes described: count, latency, highest and final rate, fall."""
         found = respond(self.spike_times, onset=self.onset, hold=self.hold)
-        return found.counted if self.unsearched else found
+        return found.counted if self.uncounted else found
+
+    @property
+    def seen(self) -> str:
+        """How many spikes were seen, marked by † where they are not all counted."""
+        return f"{self.spike_times.size}{DAGGER if self.uncounted else ''}"
 
     @property
     def adaptation(self) -> Adaptation | None:
@@ -141,8 +149,8 @@ class MeasuredTrial:
 
     @cached_property
     def _fitted(self) -> tuple[Adaptation | None, str]:
-        if self.unsearched:
-            return None, CUT_OFF
+        if self.uncounted:
+            return None, self.uncounted
         if self.response.spikes == 0:
             return None, "no spikes"
         if self.hold is None:
@@ -255,8 +263,8 @@ class Measurement:
     def _fit_circuit(
         self, trial: MeasuredTrial
     ) -> tuple[CircuitAdaptation | None, str]:
-        if trial.unsearched:
-            return None, CUT_OFF
+        if trial.uncounted:
+            return None, trial.uncounted
         if trial.hold is not None and trial.level is None:
             return None, NOT_HELD
         begin = self.applied_edge(trial)

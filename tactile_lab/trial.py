@@ -129,6 +129,9 @@ class Protocol(BaseModel):
     moves_probes: ClassVar[bool] = False
     """The probes of the circuit's voltages are put on 0 V and V_S, too: their ranges
     are widened to see both, and the model is not compared with them."""
+    counts: ClassVar[bool] = True
+    """Its answer rests on the spikes it records: nothing is concluded from a trial in
+    which they are not all counted."""
     sets: ClassVar[tuple[str, ...]] = ()
     """Voltages of the circuit that its trials set (`Trial.voltages`): a source meter of
     the bench must hold them, and the model is not compared with a run of it."""

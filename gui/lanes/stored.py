@@ -23,6 +23,7 @@ from tactile_lab.store.run import Run
 from tactile_lab.store.signal import StoredSignal
 from tactile_lab.store.spike_shapes import threshold_of
 from tactile_lab.store.stored_run import Records
+from tactile_lab.store.uncounted import uncounted
 from tactile_lab.trace import Trace
 
 FINER = 2
@@ -65,6 +66,7 @@ class RunSource(Source):
         self.trials = run.trials
         self.holds = [_hold(trial) for trial in self.trials]
         self.onsets = _onsets(run, self.trials)
+        self.uncounted = uncounted(run)
         self.simulated = run.simulated
         self.moves_probes, self.sets_voltages = _moves(run)
         self._threshold = threshold_of(run)

@@ -19,7 +19,7 @@ COLOURS = ("rate", "force", "V_C1", "V_C2", "V_K")
 COLUMNS: dict[str, tuple[str, str, Callable[[MeasuredTrial], float | None]]] = {
     "force": ("N", "m", lambda step: step.level),
     "start": ("s", "", lambda step: step.start),
-    "spikes": ("", "", lambda step: step.response.spikes),
+    "spikes": ("", "", lambda step: None if step.uncounted else step.response.spikes),
     "first spike": ("s", "m", lambda step: step.response.latency),
     "peak rate": ("Hz", "", lambda step: step.response.peak_rate),
     "final rate": ("Hz", "", lambda step: step.response.final_rate),
@@ -73,7 +73,11 @@ def rate_plot(
         trials: the steps so far.
         model: force, N, and peak rate, Hz, of the model's steps.
     """
-    steps = [(t.level, *t.response.rates) for t in trials if t.level is not None]
+    steps = [
+        (t.level, *t.response.rates)
+        for t in trials
+        if t.level is not None and not t.uncounted
+    ]
     if not any(peak > 0 for _, peak, _ in steps):
         return None
     force, peak, final = np.array(sorted(steps)).T
@@ -103,7 +107,11 @@ def train_plot(
     """The rate in the newest holds against the time since each began; None without."""
     series: list[Series] = []
     fitted = {one.step: one.law for one in laws}
-    fired = [t for t in trials if t.hold and within(t.spike_times, t.hold).size > 1]
+    fired = [
+        t
+        for t in trials
+        if t.hold and not t.uncounted and within(t.spike_times, t.hold).size > 1
+    ]
     alike = len({t.label for t in fired}) < len(fired)
     numbers = {t.start: f"no. {at}" for at, t in enumerate(trials, 1)}
     for colour, trial in zip(COLOURS, fired[: -len(COLOURS) - 1 : -1], strict=False):

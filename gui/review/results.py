@@ -238,7 +238,8 @@ class ResultsView(QWidget):
         if not self._fires:
             return NO_SPIKES
         if self._levelled:
-            return SILENT
+            why_not = next((s.uncounted for s in self._steps if s.uncounted), "")
+            return f"No rates: {why_not}." if why_not else SILENT
         return NO_LEVELS if self._steps else NO_STEPS
 
     def _choose_columns(self) -> None:
@@ -301,7 +302,7 @@ class ResultsView(QWidget):
             for where, text in enumerate(told[at]):
                 item = QTableWidgetItem(text)
                 item.setTextAlignment(RIGHT if where else LEFT)
-                item.setToolTip("" if where else text)
+                item.setToolTip(steps[at].uncounted if where else text)
                 table.setItem(at, where, item)
         table.setFixedHeight(HEAD + ROW * max(rows, 1))  # the page scrolls
 

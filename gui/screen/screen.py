@@ -244,7 +244,8 @@ class Screen(QObject):
             holds = expectation.preview.holds if expectation else []
             steps = sum(not hold.pause for hold in holds)
             searched = expectation is None or expectation.needs.detect_on is not None
-            self.results.begin(steps, fires=searched)
+            why_not = expectation.uncounted if expectation else ""
+            self.results.begin(steps, fires=searched, uncounted=why_not)
             if session.run.folder is not None:
                 self._panels.review.runs.show_current(session.run.folder)
             self.list_runs()

@@ -32,6 +32,10 @@ COLUMNS = 2000
 RATES = 12
 """Newest steps whose law is drawn."""
 
+ONSET, SLOPE = "Onset", "Slope of the peak rate"
+ADAPTATION, FALL = "Adaptation 1/|β|", "Fall in the hold"
+CARDS = (ONSET, SLOPE, ADAPTATION, FALL)
+
 SILENT = "No step that ended has fired."
 """Said also beside spikes of one that goes on, or that a fault ended."""
 
@@ -167,10 +171,13 @@ def fit(findings: Sequence[MeasuredTrial], seen: FitInput) -> Fit:
     steps = [f for f in findings if f.level is not None]
     model = [_modelled(f, seen.twin_spikes) for f in steps] if _has_model(seen) else []
     cards: tuple[Card, ...] = ()
-    if steps:
+    why_not = next((f.uncounted for f in findings if f.uncounted), "")
+    if why_not:
+        cards = tuple(Card(name, "—", _capital(why_not)) for name in CARDS if steps)
+    elif steps:
         cards = (
-            _card("Onset", _onset, steps, model),
-            _card("Slope of the peak rate", _slope, steps, model),
+            _card(ONSET, _onset, steps, model),
+            _card(SLOPE, _slope, steps, model),
             _adaptation(steps, model),
             _fall(steps, model),
         )
@@ -184,13 +191,14 @@ def fit(findings: Sequence[MeasuredTrial], seen: FitInput) -> Fit:
         Bar(signal, signal, min(found.error / FULL, 1.0), found.text)
         for signal, found in apart.items()
     ]
-    rates = tuple(_rates(steps))
-    return Fit(cards, (*bars, *_spikes(seen)), points, apart.get("V_C1"), rates)
+    if not why_not:
+        bars += _spikes(seen)
+    return Fit(cards, tuple(bars), points, apart.get("V_C1"), tuple(_rates(steps)))
 
 
 def _rates(steps: Sequence[MeasuredTrial]) -> Iterator[FittedRate]:
     for step in steps[-RATES:]:
-        if step.hold is None:
+        if step.hold is None or step.uncounted:
             continue
         try:
             law = fit_adaptation(step.spike_times, step.hold)
@@ -209,7 +217,7 @@ def _has_model(seen: FitInput) -> bool:
 def _modelled(step: MeasuredTrial, spikes: FloatArray) -> MeasuredTrial:
     end = step.start + step.duration
     inside = spikes[(spikes >= step.start) & (spikes < end)] - step.start
-    return replace(step, spike_times=inside)
+    return replace(step, spike_times=inside, uncounted="")
 
 
 def _card(
@@ -249,7 +257,7 @@ def _slope(steps: Sequence[MeasuredTrial]) -> tuple[str, str]:
 
 def _adaptation(steps: Sequence[MeasuredTrial], model: Sequence[MeasuredTrial]) -> Card:
     """Of the newest step that lets it be told."""
-    name, why = "Adaptation 1/|β|", SILENT
+    name, why = ADAPTATION, SILENT
     for at in range(len(steps) - 1, -1, -1):
         step = steps[at]
         if step.hold is None or not step.response.spikes:
@@ -276,13 +284,13 @@ def _fall(steps: Sequence[MeasuredTrial], model: Sequence[MeasuredTrial]) -> Car
     """Of the largest force that fired."""
     fell = [at for at, step in enumerate(steps) if step.response.fall is not None]
     if not fell:
-        return Card("Fall in the hold", "—", "No step that ended fired often enough.")
+        return Card(FALL, "—", "No step that ended fired often enough.")
     at = max(fell, key=lambda number_: steps[number_].level or 0.0)
     text = _where(steps[at])
     theirs = model[at].response.fall if model else None
     beside = "" if theirs is None else f"model {100 * theirs:.0f} %"
     value = f"{100 * (steps[at].response.fall or 0.0):.0f} %"
-    return Card("Fall in the hold", value, text, beside)
+    return Card(FALL, value, text, beside)
 
 
 def _where(step: MeasuredTrial) -> str:

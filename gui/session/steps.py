@@ -22,7 +22,7 @@ def cells(step: MeasuredTrial) -> tuple[str, ...]:
     found = step.response
     return (
         step.label if step.complete else f"{step.label}, cut short",
-        str(found.spikes),
+        step.seen,
         "—" if found.latency is None else number(found.latency * 1e3, 0),
         "—" if found.peak_rate is None else number(found.peak_rate, 1),
         "—" if found.final_rate is None else number(found.final_rate, 1),
@@ -30,8 +30,13 @@ def cells(step: MeasuredTrial) -> tuple[str, ...]:
     )
 
 
-def of_outcome(outcome: Outcome) -> MeasuredTrial | None:
-    """What a trial that has just ended gave; None for a pause."""
+def of_outcome(outcome: Outcome, uncounted: str = "") -> MeasuredTrial | None:
+    """What a trial that has just ended gave; None for a pause.
+
+    Args:
+        outcome: of the trial.
+        uncounted: why its spikes are not all counted; "" where they are.
+    """
     trial = outcome.trial
     if trial.pause:
         return None
@@ -43,6 +48,7 @@ def of_outcome(outcome: Outcome) -> MeasuredTrial | None:
         spike_times=outcome.spike_times,
         onset=_begun(outcome),
         hold=trial.hold,
+        uncounted=uncounted,
     )
 
 
@@ -57,8 +63,10 @@ def _begun(outcome: Outcome) -> float | None:
 def of_run(source: RunSource) -> list[MeasuredTrial]:
     """What each step of a run on disk gave."""
     found = []
-    rows = zip(source.trials, source.holds, source.onsets, strict=True)
-    for row, hold, onset in rows:
+    rows = zip(
+        source.trials, source.holds, source.onsets, source.uncounted, strict=True
+    )
+    for row, hold, onset, uncounted in rows:
         if hold.pause:
             continue
         inside = (source.spikes >= hold.start) & (source.spikes < hold.end)
@@ -74,6 +82,7 @@ def of_run(source: RunSource) -> list[MeasuredTrial]:
                 onset=onset,
                 hold=span if span[0] == span[0] else None,
                 complete=bool(row["complete"]),
+                uncounted=uncounted,
             )
         )
     return found

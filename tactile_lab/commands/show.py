@@ -43,6 +43,7 @@ def describe(path: Path) -> dict[str, Any]:
     from tactile_lab.store.remarks import read_remarks
     from tactile_lab.store.run import Run
     from tactile_lab.store.stored_run import ended
+    from tactile_lab.store.uncounted import uncounted
 
     info = read_info(path)
     cut = info["status"] == "running" and not is_live(path)
@@ -105,9 +106,12 @@ def describe(path: Path) -> dict[str, Any]:
                     "start_s": float(row["start"]),
                     "end_s": float(row["end"]),
                     "spikes": int(row["spikes"]) if searched else None,
+                    "uncounted": (why_not or None) if searched else None,
                     "complete": bool(whole),
                 }
-                for row, whole in zip(trials, ended(trials), strict=True)
+                for row, whole, why_not in zip(
+                    trials, ended(trials), uncounted(run), strict=True
+                )
             ]
             summary["overrange_blocks"] = int(run.records("overrange").size)
     return summary
@@ -144,6 +148,8 @@ def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
     if summary["duration_s"] is not None:
         spikes = summary["spikes"]
         yield "spikes", "not looked for" if spikes is None else str(spikes)
+        found = [trial["uncounted"] for trial in summary["trials"]]
+        yield "", "; ".join(dict.fromkeys(filter(None, found)))
     for trial in summary["trials"]:
         begun = f"{trial['start_s']:.3f}"
         if trial["start_s"] < trial["end_s"]:
@@ -153,6 +159,7 @@ def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
         cut = "" if trial["complete"] else ", cut short"
         spikes = trial["spikes"]
         told = "" if spikes is None else f", {count(spikes, 'spike')}"
+        told += " seen, not all" if trial["uncounted"] else ""
         yield "trial", f"{trial['label']:<12} {times}{told}{cut}"
     if summary["overrange_blocks"]:
         yield "over range", f"in {summary['overrange_blocks']} blocks"

@@ -31,6 +31,7 @@ from tactile_lab.engine.sensor import KEPT, SILENT, SensorState
 from tactile_lab.engine.task import Task
 from tactile_lab.errors import RecordingError, SceneError
 from tactile_lab.planning.plan import plan
+from tactile_lab.planning.warn import misses_spikes
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scope import Block
@@ -91,6 +92,7 @@ class Monitor(Task[Ending]):
         super().__init__(scene, used, emit)
         self._ring = Ring(keep)
         self._search = SpikeSearch.of(scene, needed.detect_on)
+        self._counted = not misses_spikes(scene, needed)
         self._last = (float("-inf"), 0.0)
         self._recording = threading.Lock()
         self._runner = Runner(
@@ -133,6 +135,7 @@ class Monitor(Task[Ending]):
             levels.get("V_C2"),
             rate if reach - when < SILENT else 0.0,
             min(reach, self._ring.length),
+            self._counted,
         )
 
     def record(self, out: Path | str, notes: Mapping[str, str] | None = None) -> Path:

@@ -22,6 +22,7 @@ class SensorState:
         critical_V_C1: the sensor fires below it, V.
         V_C1, V_C2: mean of the newest samples, V; None before there is any.
         rate: of the last two spikes, Hz; 0 where they are long ago.
+        counted: whether all spikes are seen: none falls between two samples.
         held: how much `record` would keep, s.
     """
 
@@ -30,6 +31,7 @@ class SensorState:
     V_C2: float | None = None
     rate: float = 0.0
     held: float = 0.0
+    counted: bool = True
 
     @property
     def distance(self) -> float | None:
@@ -41,8 +43,9 @@ class SensorState:
         if self.V_C1 is None or self.distance is None:
             return "no V_C1 yet"
         side = "above threshold: silent" if self.distance > 0 else "below it: fires"
+        seen = "" if self.counted else " of spikes seen, not of all"
         second = "" if self.V_C2 is None else f"  V_C2 {self.V_C2:.3f} V"
         return (
             f"V_C1 {self.V_C1:.3f} V, {1e3 * abs(self.distance):.0f} mV {side}{second}"
-            f"  {self.rate:.2f} Hz"
+            f"  {self.rate:.2f} Hz{seen}"
         )

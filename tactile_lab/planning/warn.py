@@ -96,6 +96,12 @@ def spike_width(scene: Scene) -> float:
     return scene.circuit.spike_width(threshold_of(scene))
 
 
+def misses_spikes(scene: Scene, needed: Needs) -> bool:
+    """Whether a spike fits between two samples of V_K, where they are looked for."""
+    searched = needed.detect_on == "V_K"
+    return searched and 1 / scene.record.sample_rate > spike_width(scene)
+
+
 def threshold_of(scene: Scene) -> float:
     """Threshold on V_K, V; where noise decides it, the value that is expected.
 
@@ -129,7 +135,7 @@ def _spike_sampling(scene: Scene, needed: Needs) -> Iterator[str]:
             f"no spike is high enough: V_K rises to {show(height, 'V')}, the "
             f"threshold is {show(threshold_of(scene), 'V')}. Lower it."
         )
-    elif interval > width:
+    elif misses_spikes(scene, needed):
         yield (
             f"V_K at {show(rate, 'S/s')} misses about "
             f"{100 * (1 - width / interval):.0f} % of the spikes: they stay above "

@@ -9,7 +9,7 @@ import numpy as np
 from tactile_lab.analysis.carried_over import Begun, carried_over
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import TactileLabError
-from tactile_lab.measurement import CUT_OFF, RecordedSignal
+from tactile_lab.measurement import RecordedSignal
 from tactile_lab.model.drain_current import drain_current
 from tactile_lab.plot import Plot
 from tactile_lab.report.drift import drift_plot
@@ -78,15 +78,17 @@ def find(run: RunData) -> Findings:
         except TactileLabError as reason:
             missing.append(f"No model beside the run: {reason}")
     # a trial that was cut short is told and drawn, but nothing is concluded from it
-    # nor from one whose spikes could not be told, where spikes are what it is about
-    spiking = "spikes" in run.protocol.signals
-    whole = replace(
-        run,
-        trials=tuple(
-            t for t in run.trials if t.complete and not (spiking and t.unsearched)
-        ),
+    complete = replace(run, trials=tuple(t for t in run.trials if t.complete))
+    whole, why_not = complete, "completed"
+    if complete.results and run.protocol.counts and "spikes" in run.protocol.signals:
+        # nor from one whose spikes are not all counted, where it is about them
+        counted = tuple(t for t in complete.trials if not t.uncounted)
+        whole, why_not = replace(complete, trials=counted), "counted whole"
+    conclusion = (
+        _conclusion(whole, f"No trial was {why_not}: nothing is concluded.")
+        + force_at_zero(complete)
+        + _carried_over(complete)
     )
-    conclusion = _conclusion(whole)
     answers: tuple[Plot, ...] = ()
     try:
         answers = tuple(run.protocol.plots(whole))
@@ -104,7 +106,7 @@ def find(run: RunData) -> Findings:
         missing=(
             *conclusion.missing,
             *_cut_short(run),
-            *_unsearched(run),
+            *_uncounted(run),
             *missing,
         ),
         conclusion=conclusion,
@@ -113,19 +115,19 @@ def find(run: RunData) -> Findings:
     )
 
 
-def _conclusion(run: RunData) -> Conclusion:
-    """What the protocol concludes, and F(0) where it was read."""
-    own = Conclusion(missing=("No trial was completed: nothing is concluded.",))
-    if run.results:
-        try:
-            own = run.protocol.conclude(run)
-            if not isinstance(own, Conclusion):
-                kind = type(run.protocol).__name__
-                raise TypeError(f"{kind}.conclude gave {own!r}; return a Conclusion")
-            own.plain  # noqa: B018 - what cannot be stored is no conclusion
-        except (Exception, SystemExit) as error:  # of the user's own
-            own = Conclusion(missing=(f"No conclusion: {run.protocol.fault(error)}",))
-    return own + force_at_zero(run) + _carried_over(run)
+def _conclusion(run: RunData, without: str) -> Conclusion:
+    """What the protocol concludes; `without` where there is no trial to do it from."""
+    if not run.results:
+        return Conclusion(missing=(without,))
+    try:
+        own = run.protocol.conclude(run)
+        if not isinstance(own, Conclusion):
+            kind = type(run.protocol).__name__
+            raise TypeError(f"{kind}.conclude gave {own!r}; return a Conclusion")
+        own.plain  # noqa: B018 - what cannot be stored is no conclusion
+    except (Exception, SystemExit) as error:  # of the user's own
+        return Conclusion(missing=(f"No conclusion: {run.protocol.fault(error)}",))
+    return own
 
 
 def _carried_over(run: RunData) -> Conclusion:
@@ -149,12 +151,16 @@ def _cut_short(run: RunData) -> tuple[str, ...]:
     )
 
 
-def _unsearched(run: RunData) -> tuple[str, ...]:
-    """Which trials have no numbers from spikes but their count, and why."""
-    cut = [trial.label for trial in run.results if trial.unsearched]
-    if not cut:
-        return ()
-    return (f"No latency, rate or fit of {', '.join(cut)}: {CUT_OFF}.",)
+def _uncounted(run: RunData) -> tuple[str, ...]:
+    """Which trials have no numbers from spikes but how many were seen, and why."""
+    found: dict[str, list[str]] = {}
+    for trial in run.results:
+        if trial.uncounted:
+            found.setdefault(trial.uncounted, []).append(trial.label)
+    return tuple(
+        f"No latency, rate or fit of {', '.join(labels)}: {why}."
+        for why, labels in found.items()
+    )
 
 
 def _with_drain_current(run: RunData) -> tuple[RunData, tuple[str, ...]]:

@@ -16,7 +16,11 @@ from tactile_lab.bench import COPPER
 from tactile_lab.calibration import UNCERTAINTY
 from tactile_lab.errors import SceneError
 from tactile_lab.instruments.registry import coil_capability
-from tactile_lab.measurement import MeasuredTrial, RecordedSignal
+from tactile_lab.measurement import (
+    BETWEEN_SAMPLES,
+    MeasuredTrial,
+    RecordedSignal,
+)
 from tactile_lab.model.temperature import temperature
 from tactile_lab.quantity import count, exact, show
 from tactile_lab.report.driven import played, told
@@ -26,11 +30,11 @@ from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
 from tactile_lab.store.onset import onsets
 from tactile_lab.store.overrange import told as overrange_told
-from tactile_lab.store.overrange import unsearched
 from tactile_lab.store.progress import Progress, each, nothing
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.stored_run import ended
+from tactile_lab.store.uncounted import samples_catch_spikes, uncounted
 from tactile_lab.store.warned import told as warned_told
 from tactile_lab.waveform import Waveform
 
@@ -77,7 +81,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             circuit=scene.circuit,
             belief=_belief(run, scene),
             compared=scene.compared,
-            counted=_counted(run, scene),
+            counted=samples_catch_spikes(run),
             displaced=scene.displaced,
             listed=played(run),
             lag_uncertainty=scene.bench.magnet.lag_uncertainty,
@@ -106,15 +110,6 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             conditions=_conditions(info) | _said(run.path),
             environment=info.get("environment") or {},
         )
-
-
-def _counted(run: Run, scene: Scene) -> bool:
-    """Whether no spike of the believed circuit fits between two samples of V_K."""
-    detection = run.info.get("detection") or {}
-    if detection.get("signal") != "V_K":
-        return True
-    width = scene.circuit.spike_width(detection["threshold_V"])
-    return bool(width * run.info["sample_rate_Hz"] >= 1)
 
 
 def _belief(run: Run, scene: Scene) -> Belief | None:
@@ -188,7 +183,7 @@ def _said(path: Path) -> dict[str, str]:
 def _trials(run: Run) -> tuple[MeasuredTrial, ...]:
     """The trials, and what came after the last in a run that ended before its time."""
     spikes, scene = run.spikes["time"], run.scene
-    blind, rows = unsearched(run), run.trials
+    rows = run.trials
     trials = [
         _trial(
             row,
@@ -196,10 +191,10 @@ def _trials(run: Run) -> tuple[MeasuredTrial, ...]:
             spikes,
             onset,
             _clock(run, scene, float(row["start"]), float(row["end"])),
-            blind,
+            why_not,
         )
-        for row, complete, onset in zip(
-            rows, ended(rows).tolist(), onsets(run, rows), strict=True
+        for row, complete, onset, why_not in zip(
+            rows, ended(rows).tolist(), onsets(run, rows), uncounted(run), strict=True
         )
     ]
     end = max((t.start + t.duration for t in trials), default=0.0)
@@ -215,6 +210,7 @@ def _trials(run: Run) -> tuple[MeasuredTrial, ...]:
                 onset=None,
                 complete=False,
                 clock_uncertainty=_clock(run, scene, end, run.duration),
+                uncounted="" if samples_catch_spikes(run) else BETWEEN_SAMPLES,
             )
         )
     return tuple(trials)
@@ -240,7 +236,7 @@ def _trial(
     spikes: FloatArray,
     onset: float | None,
     clock: float | None,
-    blind: FloatArray,
+    why_not: str,
 ) -> MeasuredTrial:
     start, end, level = (float(row[name]) for name in ("start", "end", "level"))
     held = (float(row["hold_start"]), float(row["hold_end"]))
@@ -257,7 +253,7 @@ def _trial(
         rest=_number(row, "rest_V_C1"),
         drift=_number(row, "drift_V_C1"),
         clock_uncertainty=clock,
-        unsearched=bool(np.any((blind[:, 0] < end) & (blind[:, 1] > start))),
+        uncounted=why_not,
     )
 
 

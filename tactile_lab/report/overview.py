@@ -245,8 +245,13 @@ def _spikes(run: Measurement, axis: ClosedTime) -> list[Told]:
     spikes = [t.spike_times + at for t, at in zip(trials, starts, strict=True)]
     looked = [(at, at + t.duration) for t, at in zip(trials, starts, strict=True)]
     every = np.concatenate([*spikes, []])
-    train = spike_train(every, axis.begin, axis.end, looked)
-    at, rates = _rates(spikes)
+    panel, said = spike_train(every, axis.begin, axis.end, looked)
+    if any(t.uncounted for t in trials):
+        said += " that were seen, not all there were"
+    train = panel, said
+    at, rates = _rates(
+        [times for t, times in zip(trials, spikes, strict=True) if not t.uncounted]
+    )
     if not rates.size:
         return [train]
     fits = [

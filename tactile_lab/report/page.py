@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
+from tactile_lab.measurement import DAGGER, MeasuredTrial
 from tactile_lab.plot import Plot
 from tactile_lab.quantity import show
 from tactile_lab.report.drift import drift_sentence
@@ -71,15 +72,19 @@ def _key_numbers(run: RunData) -> dict[str, str]:
         "Status": run.status,
         "Duration": _seconds(run.duration),
         "Trials": f"{len(run.results)}{', the last cut short' if cut else ''}",
-        "Spikes": str(sum(t.response.spikes for t in run.results))
-        if run.searched
-        else "not looked for",
+        "Spikes": _spikes(run.results) if run.searched else "not looked for",
     }
     if run.loss is not None:
         cells["Lost"] = run.loss.sentence.removeprefix("loss: ")
     if run.took is not None:
         cells["Took"] = _seconds(run.took, 3)
     return cells
+
+
+def _spikes(trials: Sequence[MeasuredTrial]) -> str:
+    """How many were seen, marked where they are not all counted."""
+    mark = DAGGER if any(t.uncounted for t in trials) else ""
+    return f"{sum(t.spike_times.size for t in trials)}{mark}"
 
 
 def _seconds(time: float, digits: int = 4) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from tactile_lab.analysis.estimate import Estimate, standard_error
 from tactile_lab.conclusion import Table
-from tactile_lab.measurement import MeasuredTrial, Measurement
+from tactile_lab.measurement import DAGGER, MeasuredTrial, Measurement
 from tactile_lab.quantity import plus_minus, printed, show
 
 NONE = "–"
@@ -42,6 +42,8 @@ def trials_table(run: Measurement) -> Table:
     )
     if run.force_uncertainty is not None:
         note += " Force: ± its 95 % uncertainty by calibration and geometry."
+    if any(trial.uncounted for trial in run.results):
+        note += f" {DAGGER}: not all spikes are counted, these were seen."
     named = any(_name(trial) != _force(trial) for trial in run.results)
     headings = (
         *("Trial",) * named,
@@ -146,7 +148,7 @@ def _row(run: Measurement, trial: MeasuredTrial) -> tuple[str, ...]:
         latency = _with(response.latency, trial.clock_uncertainty, "s", 3)
     return (
         force,
-        str(response.spikes),
+        trial.seen,
         str(response.ramp_spikes) if response.ramp_spikes else NONE,
         latency,
         _shown(response.peak_rate, "Hz"),
@@ -176,7 +178,7 @@ def _time_constants(run: Measurement) -> Iterator[str]:
         if fit is not None:
             tau, said = fit.time_constant, ""
             yield f"{tau.value:.3g} s ({tau.low:.3g} to {tau.high:.3g} s)"
-        elif trial.response.spikes == 0:
+        elif trial.response.spikes == 0 and not trial.uncounted:
             yield NONE
         else:
             yield "as above" if trial.why_not == said else trial.why_not

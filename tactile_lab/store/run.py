@@ -18,6 +18,7 @@ from tactile_lab.store.derived import derivable, drain_current_of
 from tactile_lab.store.layout import RECORDS
 from tactile_lab.store.selection import Selection
 from tactile_lab.store.stored_run import StoredRun
+from tactile_lab.store.uncounted import uncounted
 
 if TYPE_CHECKING:
     import pandas
@@ -50,7 +51,8 @@ class Run(StoredRun):
             trial: its number among `trials`.
 
         Raises:
-            NotIdentifiableError: no hold, too few spikes, or a tau they leave open.
+            NotIdentifiableError: no hold, spikes that are too few or not all counted,
+                or a tau they leave open.
         """
         from tactile_lab.analysis.circuit_adaptation import (
             FOLLOWED,
@@ -61,6 +63,8 @@ class Run(StoredRun):
         start, end = (float(row["start"] + row[n]) for n in ("hold_start", "hold_end"))
         if not start < end:
             raise NotIdentifiableError("the trial has no hold")
+        if why := uncounted(self)[trial]:
+            raise NotIdentifiableError(why)
         arrived = self.force.arrival((start + end) / 2, float(row["start"]))
         return fit_circuit_adaptation(
             self.scene.circuit,

@@ -29,13 +29,13 @@ SHORT = {
         "protocol.hold=0.5 s",
         "protocol.resolution=30 mN",
         'record.signals=["spikes"]',
-        "record.sample_rate=100 kS/s",
+        "record.sample_rate=500 kS/s",
     ),
     "demo": (
         'protocol.levels=["150 mN"]',
         "protocol.hold=0.5 s",
         'record.signals=["spikes"]',
-        "record.sample_rate=100 kS/s",
+        "record.sample_rate=500 kS/s",
     ),
 }
 ASKED = tuple(

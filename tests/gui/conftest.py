@@ -37,7 +37,7 @@ hold = "300 ms"
 rest = "100 ms"
 
 [record]
-sample_rate = "200 kS/s"
+sample_rate = "500 kS/s"
 """
 
 LONG = """

@@ -10,12 +10,12 @@ from PySide6.QtWidgets import QApplication, QFrame, QScrollArea
 from gui.lanes.expected import Stretch
 from gui.look.theme import Theme
 from gui.record.progress import ProgressStrip
-from gui.review.live_plots import COLUMNS, column_plot, rate_plot
+from gui.review.live_plots import COLUMNS, column_plot, rate_plot, train_plot
 from gui.review.results import ResultsView
 from gui.session.fit import FitInput, fit
 from gui.state import Snapshot, WindowState
 from tactile_lab.conclusion import Table
-from tactile_lab.measurement import MeasuredTrial
+from tactile_lab.measurement import BETWEEN_SAMPLES, MeasuredTrial
 
 SILENT, SLOW, FAST = (
     MeasuredTrial(
@@ -49,6 +49,26 @@ def test_steps_without_a_level_are_said_to_be_none(app) -> None:
         QApplication.processEvents()
     names = [one.name for one in view.trains.plot.panels[0].series]
     assert names == ["100 Hz, no. 2", "100 Hz, no. 1"]
+
+
+def test_steps_whose_spikes_are_not_all_counted_have_no_rate(app) -> None:
+    steps = [replace(s, uncounted=BETWEEN_SAMPLES) for s in (SILENT, SLOW, FAST)]
+    view = ResultsView(Theme("light"))
+    view.show_steps(steps, total=3, running=False, whole=True)
+    shown = [[view.table.item(r, c).text() for c in range(6)] for r in range(3)]
+    assert shown[1] == ["80 mN", "3†", "—", "—", "—", "—"]
+    assert BETWEEN_SAMPLES in view.table.item(1, 1).toolTip()
+    assert rate_plot(steps) is None
+    assert train_plot(steps) is None
+    assert column_plot(steps, "spikes", "force") is None
+    for _ in range(2):
+        QApplication.processEvents()
+    assert "missed" in view.plot.nothing
+    spikes = np.concatenate([s.start + s.spike_times for s in steps])
+    found = fit(steps, FitInput(spikes, spikes, {}))
+    assert {card.value for card in found.cards} == {"—"}
+    assert all("missed" in card.detail for card in found.cards)
+    assert not found.bars and not found.rates
 
 
 def test_a_run_longer_than_planned_is_not_beyond_its_end(app) -> None:
