@@ -180,6 +180,9 @@ class Lag:
         lasts = np.maximum.reduceat(stop, apart) if apart.size else apart
         spans = map(np.arange, first[apart], lasts)
         inside = np.concatenate([np.empty(0), *spans]) * fine
+        # on the way from one point of the wave to the next the lead is straight, too
+        behind = np.searchsorted(wave.time, inside - 2 * fine)
+        inside = inside[behind < np.searchsorted(wave.time, inside + 2 * fine)]
         # no point so near an end that what differs there would be a jump
         inside = inside[
             (inside > wave.start + fine / 2) & (inside < wave.end - fine / 2)

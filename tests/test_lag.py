@@ -82,3 +82,15 @@ def test_after_a_while_at_rest_there_is_exactly_nothing():
 
 def test_without_lag_the_wave_is_left_alone():
     assert Lag().follow(STAIRS)[0] is STAIRS
+
+
+def test_a_lead_has_points_where_it_bends_and_nowhere_else():
+    """100 s down and up at 100 Hz were 404,801 points, and their plan took 22 s."""
+    lag, fine = Lag(1.1e-3, 3e-3), 5e-4
+    time = np.linspace(0, 100, 65)
+    slow = Waveform(time, 0.1 * (1 - np.cos(np.pi * time / 100)))
+    lead = lag.led(slow, fine)
+    assert lead.time.size < 20 * time.size
+    given, _ = lag.follow(lead)
+    at = np.linspace(1, 99, 5000)
+    assert given.at(at) == pytest.approx(slow.at(at), abs=1e-6)
