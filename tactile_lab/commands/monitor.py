@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import threading
 import time
@@ -54,6 +55,8 @@ def command(
     Enter, or the signal SIGUSR1, records: the last 60 s become a run whose folder is
     printed, and watching goes on. Nothing else is stored. The simulated bench keeps
     pace with the clock.
+
+    Exit codes: 0 ended by Ctrl-C, 129 or 143 by SIGHUP or SIGTERM; others as of `run`.
     """
     asked: SimpleQueue[str] = SimpleQueue()
     with Signals({RECORD: lambda: asked.put(RECORD)}) as signals:
@@ -87,8 +90,11 @@ def _watch(
 
     ending = run_attended(monitor, signals, look)
     sight.wipe()
-    if ending.exit_code and ending.signal is None:
+    if not ending.exit_code or ending.signal == signal.SIGINT:
+        return  # Ctrl-C is how watching ends
+    if ending.signal is None:
         fail(ending.told, ending.exit_code)
+    raise click.exceptions.Exit(ending.exit_code)
 
 
 def _record(monitor: Monitor, out: Path, notes: dict[str, str]) -> None:

@@ -38,3 +38,23 @@ def test_enter_and_a_signal_record_and_ctrl_c_ends(tmp_path):
     for folder in (first, second):
         assert read(tmp_path / folder).status == "complete"
         assert (tmp_path / folder / "report.html").exists()
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_signal_that_is_no_ctrl_c_tells_its_number(name, tmp_path):
+    """Both ended it with 0, as if somebody had seen enough."""
+    if not hasattr(signal, name):
+        pytest.skip("a signal of POSIX")
+    number = getattr(signal, name)
+    watching = subprocess.Popen(
+        [sys.executable, "-c", START, "monitor", "--set", "record.sample_rate=10 kS/s"],
+        cwd=tmp_path, text=True, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        while "V_C1 4.3" not in (line := watching.stderr.readline()):
+            assert line, "it ended before it saw V_C1"
+        watching.send_signal(number)
+        watching.communicate(timeout=120)
+    finally:
+        watching.kill()
+    assert watching.returncode == 128 + number
