@@ -85,9 +85,10 @@ def command(
 ) -> None:
     """Run SCENE (or PROTOCOL.py; the demo unless given) and store every sample.
 
-    Exit codes: 0 complete, 2 refused before anything was opened, 3 faulted with the
-    coil verified off, 4 the coil's state could not be verified, 129, 130 or 143
-    interrupted by SIGHUP, SIGINT or SIGTERM with the coil verified off.
+    Exit codes: 0 complete, 1 complete but its answer could not be printed, 2 refused
+    before anything was opened, 3 faulted with the coil verified off, 4 the coil's state
+    could not be verified, 129, 130 or 143 interrupted by SIGHUP, SIGINT or SIGTERM with
+    the coil verified off.
     """
     began = time.monotonic()
     with Signals() as signals, ExitStack() as served:
@@ -110,18 +111,24 @@ def command(
                 warn(text)
         done = finished(execution, signals, watchers)
 
+        unread: list[OSError] = []
+
         def tell(done: Executed, report: Report | None) -> None:
             changed = None if again is None else _differences(again, done)
             watchers.end(answer(done, report, changed))
-            if as_json:
-                print_json(answer(done, report, changed))
-                return
-            print_run(done, report, time.monotonic() - began)
-            if changed is not None:
-                say(f"against {again}\n{changed}")
+            try:
+                if as_json:
+                    print_json(answer(done, report, changed))
+                    return
+                print_run(done, report, time.monotonic() - began)
+                if changed is not None:
+                    say(f"against {again}\n{changed}")
+            except OSError as full:
+                unread.append(full)
+                raise
 
         concluded(done, no_report=no_report, tell=tell)
-    raise click.exceptions.Exit(done.exit_code)
+    raise click.exceptions.Exit(done.exit_code or (1 if unread else 0))
 
 
 def make_folder(folder: Path) -> None:

@@ -168,3 +168,19 @@ def test_transcripts_that_cannot_be_put_there_leave_no_run(tactile_lab, tmp_path
     assert refused.code == 2
     assert "Transcripts cannot be put into" in refused.err
     assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a file of Linux")
+@pytest.mark.parametrize("how", [["--json"], []])
+def test_what_cannot_be_printed_is_an_error_and_the_run_is_kept(how, tmp_path):
+    """A script that kept the object on a full disk was told that all was well."""
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [*RUN, *SHORT, "--no-report", *how],
+            cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+    assert done.returncode == 1, done.stderr
+    assert "No space left on device" in done.stderr
+    assert "The run is kept in" in done.stderr
+    with Run.load(only_run(tmp_path)) as run:
+        assert run.status == "complete"
