@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -118,17 +119,22 @@ def command(
             known = state.exists()
             if known:
                 served.enter_context(_alone(state))
-            steps = _resumed(state, scenes, bench) if resume else _asked(scenes, bench)
+            kept_notes: dict[str, str] = {}
+            if resume:
+                steps, kept_notes = _resumed(state, scenes, bench)
+            else:
+                steps = _asked(scenes, bench)
             if not resume:
                 _refuse_to_forget(state)
             _plan_all(steps)
-            kept_notes = noted(notes)
+            kept_notes |= noted(notes)
             start = None if begin is None else _time(begin)
             others = tell_others(status, live, served, signals)
             signals.look()
             if not known:
                 served.enter_context(_alone(state))
-            _keep(state, steps)
+            keep = partial(_keep, state, steps, kept_notes)
+            keep()
         if start is not None:
             _wait(start, signals)
         for number, step in enumerate(steps):
@@ -141,7 +147,7 @@ def command(
                         code = INTERRUPTED
                         break
                     steps[number] = replace(step, told=True)
-                    _keep(state, steps)
+                    keep()
                 continue
             if step.status == "running":
                 cut = step.folder(state)
@@ -156,16 +162,16 @@ def command(
                 )
             run = str(execution.folder.path)
             steps[number] = replace(step, status="running", run=run)
-            _keep(state, steps)
+            keep()
             done = finished(execution, signals, watchers)
             signals.opened = False
             steps[number] = replace(step, status=str(done.state), run=run)
-            _keep(state, steps)
+            keep()
             if not tell_of(done, watchers, no_report=no_report):
                 code = done.exit_code or INTERRUPTED
                 break
             steps[number] = replace(steps[number], told=True)
-            _keep(state, steps)
+            keep()
             code = done.exit_code
             if code and not (go_on and code == 3):
                 break
@@ -236,14 +242,15 @@ def _alone(state: Path) -> Iterator[None]:
 
 def _resumed(
     state: Path, scenes: tuple[str, ...] = (), bench: str | None = None
-) -> list[SequenceRun]:
-    """The sequence that was begun in that folder."""
+) -> tuple[list[SequenceRun], dict[str, str]]:
+    """The sequence that was begun in that folder, and what is noted of its runs."""
     if scenes or bench:
         what = "the scenes" if scenes else "--bench"
         raise SceneError(f"--resume goes on with {state} as begun; leave {what} out.")
     try:
         held = json.loads(state.read_text(encoding="utf-8"))
-        return [SequenceRun(**one) for one in held["runs"]]
+        # older ones hold no notes
+        return [SequenceRun(**one) for one in held["runs"]], dict(held.get("notes", {}))
     except FileNotFoundError as reason:
         raise SceneError(
             f"{state} does not exist: no sequence was begun in {state.parent}. Name "
@@ -256,7 +263,7 @@ def _resumed(
 def _refuse_to_forget(state: Path) -> None:
     if not state.exists():
         return
-    left = [s for s in _resumed(state) if s.status != "complete"]
+    left = [s for s in _resumed(state)[0] if s.status != "complete"]
     if left:
         raise SceneError(
             f"{state} holds a sequence with {len(left)} runs to be done. Go on with "
@@ -281,10 +288,10 @@ def _plan_all(steps: list[SequenceRun]) -> None:
     say(f"{count(len(steps), 'run')}, {whole:.4g} s of experiment to do", sys.stderr)
 
 
-def _keep(state: Path, steps: list[SequenceRun]) -> None:
+def _keep(state: Path, steps: list[SequenceRun], notes: Mapping[str, str]) -> None:
     from tactile_lab.store.folder import write_json
 
-    write_json(state, {"runs": [asdict(step) for step in steps]})
+    write_json(state, {"runs": [asdict(step) for step in steps], "notes": notes})
 
 
 def _time(text: str) -> datetime:

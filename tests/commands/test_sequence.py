@@ -275,3 +275,20 @@ def test_resume_is_not_told_another_bench(sequence, asked):
     answer = sequence("--resume", "--bench", "sim")
     assert answer.code == 2
     assert "leave --bench out" in answer.err
+
+
+def test_what_is_noted_of_a_sequence_is_noted_of_what_is_resumed(
+    sequence, asked, tmp_path
+):
+    """--resume forgot the --note of the night before."""
+    file = asked({"scene": "demo", "times": 2})
+    assert sequence(file, "--note", "sensor=S7").code == 0
+    state = tmp_path / "runs" / "sequence.json"
+    held = json.loads(state.read_text())
+    assert held["notes"] == {"sensor": "S7"}
+    held["runs"][1] |= {"status": "", "run": "", "told": False}
+    state.write_text(json.dumps(held))
+    assert sequence("--resume", "--note", "operator=Ada").code == 0
+    _, again = kept(tmp_path)
+    info = json.loads((Path(again[1]) / "run.json").read_text())
+    assert info["notes"] == {"sensor": "S7", "operator": "Ada"}
