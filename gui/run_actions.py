@@ -17,7 +17,7 @@ from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.jobs import recover_run
 from tactile_lab.errors import TactileLabError
 from tactile_lab.store.folder import is_live
-from tactile_lab.store.remarks import add_note, read_remarks, write_remarks
+from tactile_lab.store.remarks import add_note, change_remarks
 from tactile_lab.store.summary import RunSummary
 
 
@@ -99,8 +99,9 @@ class RunActions(QObject):
     def star(self, entry: RunSummary) -> None:
         """Give a run a star, or take it away."""
         try:
-            said = read_remarks(entry.folder)
-            write_remarks(entry.folder, replace(said, starred=not said.starred))
+            change_remarks(
+                entry.folder, lambda said: replace(said, starred=not said.starred)
+            )
         except TactileLabError as error:
             self._screen.say(str(error))
         self._screen.list_runs()

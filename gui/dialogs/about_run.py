@@ -41,7 +41,7 @@ from tactile_lab.notebook import facts
 from tactile_lab.quantity import exact, parse
 from tactile_lab.scene.load import load
 from tactile_lab.store.folder import LOG, is_live, read_info
-from tactile_lab.store.remarks import Note, Remarks, read_remarks, write_remarks
+from tactile_lab.store.remarks import Note, Remarks, change_remarks, read_remarks
 from tactile_lab.table import dumped, fields_of
 
 PAGES = ("Notes", "Facts", "Settings", "Log")
@@ -161,19 +161,21 @@ class AboutRun(Overlay):
         if folder == self._folder:
             self.texts[name].setHtml(text)
 
+    def _written(self, said: Remarks) -> Remarks:
+        """What stands in the card; others note, too, while it is open."""
+        seen = self._as_read
+        late = [one for one in said.notes if seen and one not in seen.notes]
+        return replace(
+            said,
+            title=self.title.text().strip(),
+            tags=[t.strip() for t in self.tags.text().split(",") if t.strip()],
+            starred=self.star.isChecked(),
+            notes=(*self._noted(), *late),
+        )
+
     def _save(self) -> None:
         try:
-            said, seen = read_remarks(self._folder), self._as_read
-            # others note, too, while the card is open
-            late = [one for one in said.notes if seen and one not in seen.notes]
-            said = replace(
-                said,
-                title=self.title.text().strip(),
-                tags=[t.strip() for t in self.tags.text().split(",") if t.strip()],
-                starred=self.star.isChecked(),
-                notes=(*self._noted(), *late),
-            )
-            write_remarks(self._folder, said)
+            change_remarks(self._folder, self._written)
         except TactileLabError as error:
             say(self.problem, str(error))
             self.open()

@@ -39,32 +39,40 @@ def command(
         from tactile_lab.errors import SceneError
         from tactile_lab.quantity import parse
         from tactile_lab.store.folder import read_info
-        from tactile_lab.store.remarks import Note, read_remarks, write_remarks
+        from tactile_lab.store.remarks import (
+            Note,
+            Remarks,
+            change_remarks,
+            read_remarks,
+        )
 
         read_info(run)  # a run, and no other folder
-        before = found = read_remarks(run)
         if at is not None and not text:
             raise SceneError("--at says when a note is of; write the note after RUN.")
+        note = None
         if text is not None:
             if not text.strip():
                 raise SceneError("The note is empty.")
             note = Note(text=text, time=None if at is None else parse(at, "s"))
-            found = replace(found, notes=(*found.notes, note))
-        missing = [_word(one) for one in untag if _word(one) not in found.tags]
-        if missing:
-            raise SceneError(
-                f"{run.resolve().name} has no tag {missing[0]}; it has "
-                f"{', '.join(found.tags) or 'none'}."
+        added, gone = tuple(map(_word, tag)), {_word(one) for one in untag}
+
+        def change(said: Remarks) -> Remarks:
+            for word in sorted(gone - {*said.tags}):
+                raise SceneError(
+                    f"{run.resolve().name} has no tag {word}; it has "
+                    f"{', '.join(said.tags) or 'none'}."
+                )
+            tags = dict.fromkeys((*said.tags, *added))
+            return replace(
+                said,
+                notes=said.notes if note is None else (*said.notes, note),
+                tags=tuple(one for one in tags if one not in gone),
+                starred=said.starred if star is None else star,
+                title=said.title if title is None else title.strip(),
             )
-        gone = {_word(one) for one in untag}
-        tags = dict.fromkeys((*found.tags, *map(_word, tag)))
-        found = replace(found, tags=tuple(one for one in tags if one not in gone))
-        if star is not None:
-            found = replace(found, starred=star)
-        if title is not None:
-            found = replace(found, title=title.strip())
-        if found != before:
-            write_remarks(run, found)
+
+        asked = (note, star, title) != (None, None, None) or tag or untag
+        found = change_remarks(run, change) if asked else read_remarks(run)
     if as_json:
         notes = [{"text": n.text, "time_s": n.time, "at": n.at} for n in found.notes]
         print_json(

@@ -6,13 +6,14 @@ They stand in a file of their own beside the record, and can be changed at any t
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 
 from tactile_lab.errors import RunFolderError
-from tactile_lab.store.folder import LOG, write_json
+from tactile_lab.store.folder import LOG, lock, write_json
+from tactile_lab.whole_file import failing_as
 
 REMARKS = "remarks.json"
 
@@ -87,6 +88,30 @@ def write_remarks(path: Path, remarks: Remarks) -> None:
     write_json(path / REMARKS, asdict(replace(remarks, notes=ordered)))
 
 
+def change_remarks(path: Path, change: Callable[[Remarks], Remarks]) -> Remarks:
+    """Change the remarks on the run in folder `path`, one hand after another.
+
+    Args:
+        path: the run's folder.
+        change: makes the new ones of those that are there; what it raises changes
+            nothing.
+
+    Returns:
+        The remarks as they are now.
+
+    Raises:
+        RunFolderError: the remarks so far are damaged.
+        RecordingError: the folder cannot be written.
+    """
+    with failing_as(f"{path} cannot be written"), (path / "run.json").open("r+") as run:
+        lock(run, wait=True)
+        before = read_remarks(path)
+        after = change(before)
+        if after != before:
+            write_remarks(path, after)
+        return after
+
+
 def add_note(path: Path, text: str, time: float | None = None) -> None:
     """Add a note, at `time` s on the run's axis, to the run in folder `path`.
 
@@ -94,9 +119,8 @@ def add_note(path: Path, text: str, time: float | None = None) -> None:
         RunFolderError: the remarks so far are damaged.
         RecordingError: the folder cannot be written.
     """
-    before = read_remarks(path)
-    notes = (*before.notes, Note(text=text, time=time))
-    write_remarks(path, replace(before, notes=notes))
+    note = Note(text=text, time=time)
+    change_remarks(path, lambda said: replace(said, notes=(*said.notes, note)))
 
 
 def _logged(log: Path) -> Iterator[Note]:

@@ -1,6 +1,8 @@
 """Name, tags and notes of a run, and how they are found again."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 from click.testing import CliRunner
@@ -110,3 +112,18 @@ def test_a_remark_that_is_none_is_refused_and_nothing_written(run, words, why):
     done = _noted(run, *words)
     assert done.exit_code == 2 and why in done.output
     assert not (run / REMARKS).exists()
+
+
+def test_notes_of_many_hands_at_once_are_all_kept(run):
+    """Two `tactile-lab note` at once read the same file, and the later one won."""
+    code = (
+        "import sys; from pathlib import Path;"
+        "from tactile_lab.store.remarks import add_note;"
+        "[add_note(Path(sys.argv[1]), f'{sys.argv[2]} {k}') for k in range(20)]"
+    )
+    hands = [
+        subprocess.Popen([sys.executable, "-c", code, str(run), name])
+        for name in ("one", "other", "third")
+    ]
+    assert [hand.wait() for hand in hands] == [0, 0, 0]
+    assert len(read_remarks(run).notes) == 60
