@@ -193,3 +193,12 @@ def test_the_circuit_of_a_taxel_is_written_as_its_page_says(tmp_path, monkeypatc
     assert written == {
         "taxel.brian2.py", "taxel.nestml", "taxel.nir", "taxel.force.npz",
     }  # fmt: skip
+
+
+def test_a_design_that_the_readme_names_is_there_and_is_the_one_explained():
+    """It named light.toml, which stood only within a page."""
+    (shown, *_) = blocks("how-to/choose-parts.md", "toml")
+    assert (DOCS / "how-to/light.toml").read_text(encoding="utf-8") == shown
+    for page in ("../README.md", "how-to/choose-parts.md"):
+        text = (DOCS / page).read_text(encoding="utf-8")
+        assert "tactile-lab design docs/how-to/light.toml" in text
