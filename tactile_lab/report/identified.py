@@ -98,11 +98,13 @@ def identify_runs(
 def _evidence(run: RunData, names: Sequence[str]) -> Evidence:
     """What a run says of the parameters."""
     trace = run.trace("V_C1")
-    if (
-        run.circuit is None
-        or run.belief is None
-        or (trace is None and run.train is None)
-    ):
+    if run.circuit is None or run.belief is None:
+        raise NotIdentifiableError(
+            f"{run.run} ({run.title}) drove no coil: what is fitted is how V_C1 and "
+            "the spikes answer a force. Name a run that presses the sensor, such as "
+            "of demo"
+        )
+    if trace is None and run.train is None:
         raise NotIdentifiableError(
             f"{run.run} has neither V_C1 nor all of its spikes; record V_C1, or V_K "
             "at a rate that misses none"

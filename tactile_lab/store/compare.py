@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import show
-from tactile_lab.store.folder import SCENE
+from tactile_lab.store.folder import SCENE, read_info
 from tactile_lab.store.run import Run
 
 
@@ -38,17 +39,21 @@ class Differences:
 
 
 def differences(old: Path, new: Path) -> Differences:
-    """Compare the runs in two folders.
+    """Compare the runs in two folders, their settings also where one has no samples.
 
     Raises:
-        RunFolderError: one of them is no run, or has no data.
+        RunFolderError: one of them is no run.
     """
-    with Run.load(old) as one, Run.load(new) as other:
-        return Differences(
-            tuple(_environment(one.info, other.info)),
-            (*_values(one.attributes, other.attributes), *_scene(old, new)),
-            tuple(_results(one, other)),
-        )
+    environment = tuple(_environment(read_info(old), read_info(new)))
+    calibration: tuple[str, ...] = ()
+    scene = tuple(_scene(old, new))
+    try:
+        with Run.load(old) as one, Run.load(new) as other:
+            calibration = tuple(_values(one.attributes, other.attributes))
+            results = tuple(_results(one, other))
+    except RunFolderError as reason:
+        results = (f"not compared: {reason}",)
+    return Differences(environment, (*calibration, *scene), results)
 
 
 def _environment(old: dict[str, Any], new: dict[str, Any]) -> Iterator[str]:

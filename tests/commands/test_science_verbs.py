@@ -155,3 +155,25 @@ def test_a_run_without_v_k_says_what_it_cannot_tell_and_keeps_the_rest(tmp_path)
     assert again.exit_code == 0
     assert "150 mN" in again.stdout
     assert "spikes were not looked for" in again.stderr
+
+
+def test_identify_of_a_run_without_force_says_what_it_needs(tmp_path):
+    """A monitor's run, which has V_C1, was said to have neither V_C1 nor spikes."""
+    changes = {"protocol.duration": 1.0, "protocol.part": 1.0}
+    folder = Execution(load("monitor", changes), tmp_path).run().folder
+    refused = call("identify", folder, "V_GS")
+    assert refused.exit_code == 2
+    assert "drove no coil" in refused.stderr and "demo" in refused.stderr
+
+
+def test_runs_of_which_one_has_lost_its_samples_are_compared(tmp_path):
+    """They were refused as a whole, though both folders say what they were run with."""
+    folders = []
+    for hold in (0.2, 0.3):
+        changes = {"protocol.hold": hold, "protocol.levels": (0.1,)}
+        folders.append(Execution(load("demo", changes), tmp_path).run().folder)
+    (folders[1] / "data.h5").unlink()
+    done = call("compare", *folders)
+    assert done.exit_code == 0, done.stderr
+    assert "protocol.hold" in done.stdout
+    assert "results: not compared" in done.stdout and "data.h5" in done.stdout
