@@ -36,6 +36,13 @@ LONGEST = 300
 """Characters of a foreign error's text that are told: a KeyError repeats its key."""
 
 
+def to_type(*words: object) -> str:
+    """A command of this program for a message to tell, quoted as a shell takes it."""
+    import shlex
+
+    return shlex.join(["tactile-lab", *map(str, words)])
+
+
 def fault_in(file: str | Path, error: BaseException) -> str:
     """Kind and text of an error, and where in a user's file it came from, if it did."""
     import traceback

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from tactile_lab.columns import read_text
-from tactile_lab.errors import SceneError
+from tactile_lab.errors import SceneError, to_type
 
 INFO = "run.json"
 """What makes a folder that of a run."""
@@ -59,7 +59,7 @@ def check(table: Mapping[str, Any], folder: Path) -> None:
         raise SceneError(
             f"{folder} holds code that was not run on this computer, or was changed "
             f"since: {', '.join(map(str, strange))}. It would be executed. Read it, "
-            f"and if you trust it: tactile-lab trust {folder}"
+            f"and if you trust it: {to_type('trust', folder)}"
         )
 
 

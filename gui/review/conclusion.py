@@ -9,7 +9,7 @@ from typing import Any
 
 from tactile_lab.analysis.wiring import ChannelVerdict
 from tactile_lab.conclusion import Table
-from tactile_lab.errors import RunFolderError
+from tactile_lab.errors import RunFolderError, to_type
 from tactile_lab.plot import Plot
 
 
@@ -59,7 +59,7 @@ def conclusion_of(folder: Path) -> ShownConclusion:
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunFolderError(
             f"{file} cannot be read ({type(error).__name__}: {error}). Write the "
-            f"report again: tactile-lab report {folder}"
+            f"report again: {to_type('report', folder)}"
         ) from error
 
 

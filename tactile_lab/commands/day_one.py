@@ -20,6 +20,7 @@ from tactile_lab.commands.day_steps import STEPS, FirstDayStep, levels
 from tactile_lab.commands.one_run import finished, prepared, tell_of
 from tactile_lab.commands.options import noted, notes_option
 from tactile_lab.commands.terminal import fail, refusing, say, somebody, warn
+from tactile_lab.errors import to_type
 
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
@@ -91,7 +92,7 @@ def command(
             if wrong:
                 say(f"  WRONG: {wrong}\n  what to do: {step.otherwise}")
                 if step.wrong is not None:
-                    again_command = f"tactile-lab day-one --out {out}"
+                    again_command = to_type("day-one", "--out", out)
                     fail(f"mend that, then go on with {again_command}", day.code or 1)
     with refusing():
         page = day.page(kept_notes)

@@ -19,6 +19,7 @@ from tactile_lab.commands.terminal import (
     warn,
     working,
 )
+from tactile_lab.errors import to_type
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -359,7 +360,7 @@ class Whole:
             text = f"{type(failure).__name__}: {failure}".removesuffix(": ")
             warn(
                 f"{what} was cut short ({text}). The run is kept in {self._folder}; "
-                f"`tactile-lab report {self._folder}` writes its report again."
+                f"`{to_type('report', self._folder)}` writes its report again."
             )
 
 

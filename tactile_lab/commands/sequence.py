@@ -32,7 +32,7 @@ from tactile_lab.commands.options import (
     status_option,
 )
 from tactile_lab.commands.terminal import StatusLine, refusing, say, warn
-from tactile_lab.errors import SceneError, choices
+from tactile_lab.errors import SceneError, choices, to_type
 
 if TYPE_CHECKING:
     from tactile_lab.scene.scene import Scene
@@ -152,7 +152,7 @@ def command(
             if step.status == "running":
                 cut = step.folder(state)
                 warn(
-                    f"{cut} was not ended; `tactile-lab recover {cut}` makes whole "
+                    f"{cut} was not ended; `{to_type('recover', cut)}` makes whole "
                     "what it holds. It is done again."
                 )
             say(f"{number + 1} of {len(steps)}: {step.scene}", sys.stderr)
@@ -334,6 +334,7 @@ def _summary(steps: list[SequenceRun], state: Path) -> None:
     left = sum(step.status != "complete" for step in steps)
     if left:
         warn(
-            f"{left} of {len(steps)} are not complete; `tactile-lab sequence --resume "
-            f"--out {state.parent}` goes on with them."
+            f"{left} of {len(steps)} are not complete; "
+            f"`{to_type('sequence', '--resume', '--out', state.parent)}` goes on with "
+            "them."
         )

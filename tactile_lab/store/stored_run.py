@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.errors import RunFolderError
+from tactile_lab.errors import RunFolderError, to_type
 from tactile_lab.quantity import count, show
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.spikes.rate import rate_changes
@@ -67,11 +67,11 @@ class StoredRun:
         """
         path = Path(path)
         info = read_info(path)
-        file = path / DATA
+        file, again = path / DATA, to_type("run", "--again", path)
         if has_lost_data(path, info):
             raise RunFolderError(
                 f"{path} has no {DATA}, which was written: it was moved or deleted. "
-                f"Put it back; `tactile-lab run --again {path}` repeats the run."
+                f"Put it back; `{again}` repeats the run."
             )
         if not file.exists():
             status = info["status"]
@@ -79,7 +79,7 @@ class StoredRun:
             raise RunFolderError(
                 f"{path} has no {DATA}: the run {how} before the first "
                 "sample was stored. `tactile-lab show` says why; "
-                f"`tactile-lab run --again {path}` repeats it."
+                f"`{again}` repeats it."
             )
         try:
             live = info["status"] == "running" and is_live(path)
