@@ -12,6 +12,8 @@ from tactile_lab.commands.terminal import fail, print_json, refusing, say
 from tactile_lab.errors import TactileLabError
 
 FAULTED = 3
+UNITS = ("_V", "_A", "_T", "_K", "_s", "_part")
+"""End the names of settings that are numbers; an instrument's own codes are texts."""
 
 
 @click.command()
@@ -96,7 +98,18 @@ def _try_out(
         fail(str(reason), FAULTED)
     else:
         if as_json:
-            print_json(settings)
+            print_json({name: _plain(name, text) for name, text in settings.items()})
         else:
             for name, value in settings.items():
                 say(f"{name:20}{value}")
+
+
+def _plain(name: str, text: str) -> str | float | bool | list[str]:
+    """What was read back, as JSON has it."""
+    if name == "baud":
+        return int(text)
+    if name == "output":
+        return text == "on"
+    if name == "not_tried":
+        return text.split(", ") if text else []
+    return float(text) if name.endswith(UNITS) else text

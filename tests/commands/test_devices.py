@@ -38,6 +38,20 @@ def test_devices_tries_out_and_writes_the_transcript(tactile_lab, coil, tmp_path
     assert '> "*IDN?\\n"' in path.read_text()
 
 
+def test_what_is_read_back_is_numbers_where_it_is_numbers(tactile_lab, coil):
+    """All were texts: "compliance_V": "1"."""
+    words = ("devices", "--port", coil, "--dialect", "kepco-bop", "--json")
+    found = tactile_lab(*words).json
+    assert all(
+        isinstance(found[name], float) for name in ("compliance_V", "setpoint_A")
+    )
+    assert found["update_interval_s"] > 0
+    assert isinstance(found["baud"], int)
+    assert found["output"] is False
+    assert "OUTP 1" in found["not_tried"] and isinstance(found["not_tried"], list)
+    assert isinstance(found["identity"], str)
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "why"),
     [
