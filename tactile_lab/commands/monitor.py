@@ -119,6 +119,8 @@ class SensorLine:
         self._stream = stream
         self._line = StatusLine(stream) if stream.isatty() else None
         self._next = 0.0
+        if self._line is not None:  # on a line of its own: 80 columns hold the state
+            say("Enter records, Ctrl-C ends", stream)
 
     def show(self, text: str) -> None:
         """Show `text` if it is time to."""
@@ -127,7 +129,7 @@ class SensorLine:
             return
         if self._line is not None:
             self._next = now + SHOWN_EVERY
-            self._line.show(f"{text}   Enter records, Ctrl-C ends")
+            self._line.show(text)
         else:
             self._next = now + LINE_EVERY
             say(text, self._stream)

@@ -1,3 +1,4 @@
+import contextlib
 import os
 import signal
 import subprocess
@@ -58,3 +59,40 @@ def test_a_signal_that_is_no_ctrl_c_tells_its_number(name, tmp_path):
     finally:
         watching.kill()
     assert watching.returncode == 128 + number
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a terminal of POSIX")
+def test_what_a_key_does_is_read_in_80_columns_and_enter_records(tmp_path):
+    """The line was cut at "Enter rec…": nobody could read how to record or to end."""
+    import fcntl
+    import pty
+    import struct
+    import termios
+
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+    watching = subprocess.Popen(
+        [sys.executable, "-c", START, "monitor", "--keep", "2", "--out", "kept",
+         "--set", "record.sample_rate=10 kS/s"],
+        cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=theirs,
+        env={**os.environ, "TERM": "xterm"},
+    )  # fmt: skip
+    os.close(theirs)
+    seen = b""
+    try:
+        while b"V_C1 4.3" not in seen:
+            seen += os.read(ours, 4096)
+        os.write(ours, b"\n")
+        while b"run     kept" not in seen:
+            seen += os.read(ours, 4096)
+        watching.send_signal(signal.SIGINT)
+        with contextlib.suppress(OSError):  # the terminal's end
+            while part := os.read(ours, 4096):
+                seen += part
+        assert watching.wait(timeout=120) == 0
+    finally:
+        watching.kill()
+        os.close(ours)
+    assert "Enter records, Ctrl-C ends" in seen.decode(errors="replace")
+    (folder,) = (tmp_path / "kept").iterdir()
+    assert read(folder).status == "complete"
