@@ -45,14 +45,19 @@ def readings(path: Path, scene: Scene) -> Question:
             many as holds are planned, or nobody is to read the field.
     """
     from tactile_lab.acquisition.asked_field import read_off
+    from tactile_lab.instruments.registry import BY_PERSON
     from tactile_lab.planning.needs import needs
     from tactile_lab.planning.timeline import timeline
 
     drive = timeline(scene, through_coil=True)
     if not needs(scene, drive).asked_field:
+        meter = scene.bench.field_meter
+        remedy = 'Give the bench a teslameter with [field_meter] driver = "manual"'
+        if meter is not None and meter.driver == BY_PERSON:
+            remedy = 'Write "field" into record.signals'
         raise SceneError(
-            f"--field {path}: {scene.name} has nobody read the field. Give the bench a "
-            'teslameter with [field_meter] driver = "manual", or leave --field out.'
+            f"--field {path}: {scene.name} has nobody read the field. {remedy}, or "
+            "leave --field out."
         )
     try:
         text = path.read_text(encoding="utf-8")

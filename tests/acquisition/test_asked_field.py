@@ -100,6 +100,10 @@ def test_a_file_that_does_not_fit_is_refused(tmp_path, text, why):
 def test_a_file_for_a_bench_with_a_meter_is_refused(tmp_path):
     with pytest.raises(SceneError, match="leave --field out"):
         readings(tmp_path / "shown.txt", load("calibrate_field"))
+    # the bench has one, and was told to be given one
+    by_hand = load("force_check", (), str(scene(tmp_path).bench.path))
+    with pytest.raises(SceneError, match=r'Write "field" into record\.signals'):
+        readings(tmp_path / "shown.txt", by_hand)
 
 
 @pytest.mark.parametrize(
