@@ -134,7 +134,14 @@ def test_a_trial_that_the_run_ended_before_is_not_said_to_end_before_it_begins(r
 
     told = describe(run)
     told["trials"] = [
-        {"label": "9 N", "start_s": 4.7, "end_s": 3.1, "spikes": 0, "complete": False}
+        {
+            "label": "9 N",
+            "start_s": 4.7,
+            "end_s": 3.1,
+            "spikes": 0,
+            "uncounted": None,
+            "complete": False,
+        }
     ]
     (trial,) = (text for name, text in rows(told) if name == "trial")
     assert trial.split(maxsplit=2)[2].startswith("would have begun at 4.700 s, 0 ")
