@@ -43,6 +43,8 @@ class Queue(QObject):
         bench: that is connected; None where there is none.
         free: whether that is free.
         running: whether a run is in progress, which the first one follows.
+        let_go: has the monitor let go of the bench, and tells whether it has; `next`
+            is asked again once it has.
         start: starts a run.
 
     Attributes:
@@ -60,11 +62,13 @@ class Queue(QObject):
         bench: Callable[[], str | None],
         free: Callable[[], bool],
         running: Callable[[], bool],
+        let_go: Callable[[], bool],
         start: Callable[[Queued], None],
     ) -> None:
         super().__init__()
         self._planner, self._log, self._running = planner, log, running
-        self._bench, self._free, self._start = bench, free, start
+        self._bench, self._free = bench, free
+        self._let_go, self._start = let_go, start
         self.items: list[Queued] = []
         self.held = False
 
@@ -126,6 +130,8 @@ class Queue(QObject):
             if self.items[0].request.bench != self._bench():
                 self._hold_for_bench(self.items[0])
                 return
+            if not self._let_go():
+                return  # it waits here meanwhile: a STOP holds it, and drops nothing
             item = self.items.pop(0)
             item.left = "has started with the parameters it had"
             self.changed.emit()

@@ -89,6 +89,7 @@ class Session(QObject):
             lambda: self.bench.choice,
             lambda: self._free,
             lambda: self.run.alive or self.state.in_run,
+            self._let_go,
             lambda item: self.start(item.request, item.title, item.expectation),
         )
         self._chips = Chips(self.status, self.bench, self.run, self.monitor)
@@ -105,6 +106,7 @@ class Session(QObject):
         self.monitor.begun.connect(lambda source: self._show_live(source, MONITOR))
         self.manual.begun.connect(lambda source: self._show_live(source, BY_HAND))
         self.monitor.ended.connect(self._start_after_monitor)
+        self.monitor.ended.connect(self.queue.next)
 
     # --- what the window asks for
 
@@ -161,8 +163,7 @@ class Session(QObject):
         """
         if not self._free:
             return
-        if self.monitor.alive:
-            self.monitor.stop("a run begins")
+        if not self._let_go():
             self._after_monitor = (request, title, expectation)
             return
         self.status.fault, self.source = None, None
@@ -214,7 +215,10 @@ class Session(QObject):
 
         Runs that wait in the queue are held until somebody resumes it.
         """
-        self._after_monitor = None
+        if self._after_monitor is not None:
+            title = self._after_monitor[1]
+            self._log_stop(f"{title} was not begun", Severity.WARNING)
+            self._after_monitor = None
         self.stopped.emit()
         if self.manual.alive:
             self.manual.stop(reason)
@@ -324,6 +328,11 @@ class Session(QObject):
     def _show_live(self, source: LiveSource, unkept: str) -> None:
         self.source, self.unkept = source, unkept
         self.source_changed.emit(source)
+
+    def _let_go(self) -> bool:
+        """Have the monitor let go of the bench; whether it has."""
+        self.monitor.stop("a run begins")
+        return not self.monitor.alive
 
     def _start_after_monitor(self) -> None:
         wanted, self._after_monitor = self._after_monitor, None

@@ -402,6 +402,26 @@ def test_a_stop_that_finds_its_run_just_over_begins_no_other(lab) -> None:
     assert len(waiting(lab)) == 1 and session.queue.held and not session.busy
 
 
+def test_a_stop_while_the_monitor_lets_go_keeps_the_queued_run(lab) -> None:
+    """It had left the queue and was dropped without a word."""
+    session, setup = lab.session, lab.window.setup
+    setup.buttons.queue.click()
+    lab.until(lambda: waiting(lab) and waiting(lab)[0].expectation is not None)
+    (item,) = waiting(lab)
+    session.show_monitor(True)
+    lab.until(lambda: session.monitor.source is not None)
+    setup.queue.resume.click()
+    session.stop("STOP")
+    lab.until(lambda: not session.monitor.alive)
+    assert waiting(lab) == [item] and session.queue.held and not session.busy
+    session.show_monitor(True)
+    lab.until(lambda: session.monitor.source is not None)
+    setup.queue.resume.click()
+    lab.until(lambda: session.state is WindowState.RUNNING)
+    assert not waiting(lab) and not session.monitor.alive
+    idle_after_run(lab)
+
+
 def test_a_queued_run_begins_on_the_bench_it_was_queued_for_alone(lab) -> None:
     """Else the header would name one bench while another is driven."""
     session, setup = lab.session, lab.window.setup
