@@ -91,7 +91,7 @@ def main(
     window = Window(session, chosen, settings, wishes)
     fit(window, window.screen().availableSize())
     window.show()
-    _close_on_signals(lambda: window.leave() if window.session.busy else window.close())
+    _close_on_signals(window.leave)
     QTimer.singleShot(0, lambda: begin(window, target or wishes.scene, None))
     with collected_here():
         app.exec()

@@ -144,6 +144,8 @@ class Snapshot:
         expected: run time expected, s; None if unknown.
         manual: the coil is driven by hand.
         known: the instruments answered lately; else nobody knows whether they do.
+        queued: titles of the runs that wait; only this window has them.
+        notes: those kept for the next run; only this window has them.
         fault: unacknowledged fault.
     """
 
@@ -158,6 +160,8 @@ class Snapshot:
     expected: float | None = None
     manual: bool = False
     known: bool = True
+    queued: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     fault: FaultNotice | None = None
 
     @property

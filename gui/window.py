@@ -186,13 +186,15 @@ class Window(QMainWindow):
     # --- closing
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Close at once where nothing drives the coil; else ask."""
-        if self.session.busy and not self._leaving:
+        """Close at once where nothing drives the coil, or would be lost; else ask."""
+        session = self.session
+        lost = bool(session.queue.items or session.run.waiting)
+        if (session.busy or lost) and not self._leaving:
             event.ignore()
-            self.closing.ask(self.session.snapshot())
+            self.closing.ask(session.snapshot(), busy=session.busy)
             return
-        if self.session.occupied:
-            self.session.show_monitor(False)
+        if session.occupied:
+            session.show_monitor(False)
             self._leaving = True
             event.ignore()
             return
@@ -211,8 +213,16 @@ class Window(QMainWindow):
             app.quit()
 
     def leave(self) -> None:
-        """Stop, then close once the coil is verified off, or its failure was shown."""
+        """Close without a question.
+
+        What drives the coil is stopped, and the window closes once that is verified
+        off, or its failure was shown.
+        """
         self._leaving = True
+        if not self.session.busy:
+            self.session.queue.hold()  # it would begin once the monitor has let go
+            self.close()
+            return
         self.session.stop("the window is closed")
         self.closing.say("Stopping", "The coil goes to 0 mA and is read back.")
         QTimer.singleShot(OFF_TIMEOUT, self._off_late)
@@ -220,11 +230,11 @@ class Window(QMainWindow):
     def _close_when_off(self) -> None:
         if not self._leaving or self.session.occupied:
             return
-        self._leaving = False
         if self.session.state is not WindowState.FAULT:
             self.close()
         else:
             self.closing.hide()  # the banner has to be read
+        self._leaving = False
 
     def _off_late(self) -> None:
         if self._leaving and self.session.busy:

@@ -1,6 +1,9 @@
-"""The question asked when the window is closed while the coil is in use."""
+"""The question asked when the window is closed over what would be ended or lost."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
@@ -12,9 +15,12 @@ from gui.look.theme import Theme
 from gui.parts import label, push
 from gui.state import Snapshot, minutes, stop_text
 
+NAMED, LENGTH = 3, 60
+"""How many queued runs and notes are named, and how many letters of each."""
+
 
 class Closing(Overlay):
-    """Keep running (the default, and Esc) or stop, verify off and close."""
+    """Keep the window (the default, and Esc), or stop, verify off and close."""
 
     stopped = Signal()
 
@@ -24,68 +30,64 @@ class Closing(Overlay):
         self._theme = theme
         self._sign = QLabel()
         self._title = label("", "big", wrap=True)
-        self._text = label("", "", wrap=True)
+        self.text = label("", "", wrap=True)
         self.now = label("", "muted", wrap=True)
         self.keep = push("Keep running", "primary")
         self.stop = push("Stop, coil off and close", "danger")
         self.ask_with(
-            self._sign, [self._title, self._text, self.now], [self.stop, self.keep]
+            self._sign, [self._title, self.text, self.now], [self.stop, self.keep]
         )
         self.keep.clicked.connect(self._keep)
         self.stop.clicked.connect(self._stop)
 
-    def ask(self, snapshot: Snapshot) -> None:
-        """Ask; says what happens to coil and data."""
+    def ask(self, snapshot: Snapshot, *, busy: bool) -> None:
+        """Ask; says what happens to coil and data, and what is lost."""
         self._sign.setPixmap(pixmap("warning", self._theme.tokens.amber, 28))
-        if snapshot.manual:
-            self._title.setText("The coil is driven by hand. Close anyway?")
-            self._text.setText(
-                "Closing ramps the coil to <b>0 mA</b>, switches the output off and "
-                "verifies it by read-back."
-            )
-            self.keep.setText("Keep open")
-        else:
-            self._title.setText("A run is in progress. Close anyway?")
-            self._text.setText(
-                f"Closing stops <b>{snapshot.title}</b> where it is, "
-                "ramps the coil to <b>0 mA</b>, verifies it by read-back, and keeps "
-                "the data so far as an <i>aborted</i> run."
-            )
-            self.keep.setText("Keep running")
         self.keep.show()
         self.stop.setEnabled(True)
-        self.open()
         self._asking = True
-        self.render_snapshot(snapshot, busy=True)
+        self.render_snapshot(snapshot, busy=busy)
+        self.open()
         self.keep.setDefault(True)
         self.keep.setFocus()
 
     def render_snapshot(self, snapshot: Snapshot, *, busy: bool) -> None:
-        """While it asks, tell what the coil does now; go where nothing is in use."""
+        """While it asks, tell what is so now; go where nothing is in use or lost.
+
+        Args:
+            snapshot: what is so now.
+            busy: whether something has the coil, or is about to.
+        """
         if not self._asking:
             return
-        if not busy:
+        lost = _lost(snapshot)
+        if not busy and not lost:
             self._keep()
             return
-        said = stop_text(snapshot.state, snapshot.coil).detail
-        left = ""
-        if snapshot.expected is not None and not snapshot.manual:
-            rest = max(0.0, snapshot.expected - snapshot.elapsed)
-            left = f" · remaining {minutes(rest)}"
-        self.now.setText(f"Coil: {said}{left}")
+        title, text, keep, stop = _question(snapshot, busy=busy)
+        text = "<br>".join(part for part in (text, lost) if part)
+        grows = text != self.text.text()
+        self._title.setText(title)
+        self.text.setText(text)
+        self.keep.setText(keep)
+        self.stop.setText(stop)
+        self.now.setVisible(busy)
+        self.now.setText(_now(snapshot))
+        if grows and self.isVisible():
+            self._place()
 
     def say(self, title: str, text: str) -> None:
         """Tell how the closing goes, without a question."""
         self._asking = False
         self._title.setText(title)
-        self._text.setText(text)
+        self.text.setText(text)
         self.now.setText("")
         self.keep.hide()
         self.stop.setEnabled(False)
         self._place()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Esc keeps running; the arrows move between the buttons."""
+        """Esc keeps the window; the arrows move between the buttons."""
         if event.key() == Qt.Key.Key_Escape:
             self._keep()
         elif event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
@@ -99,3 +101,52 @@ class Closing(Overlay):
 
     def _stop(self) -> None:
         self.stopped.emit()
+
+
+def _question(snapshot: Snapshot, *, busy: bool) -> tuple[str, str, str, str]:
+    """Title, text, and the words on both buttons."""
+    if not busy:
+        return "Not all of it is kept. Close anyway?", "", "Keep window", "Close anyway"
+    stop = "Stop, coil off and close"
+    if snapshot.manual:
+        title = "The coil is driven by hand. Close anyway?"
+        text = (
+            "Closing ramps the coil to <b>0 mA</b>, switches the output off and "
+            "verifies it by read-back."
+        )
+        return title, text, "Keep open", stop
+    text = (
+        f"Closing stops <b>{escape(snapshot.title)}</b> where it is, "
+        "ramps the coil to <b>0 mA</b>, verifies it by read-back, and keeps "
+        "the data so far as an <i>aborted</i> run."
+    )
+    return "A run is in progress. Close anyway?", text, "Keep running", stop
+
+
+def _now(snapshot: Snapshot) -> str:
+    """What the coil does, and how long the run still takes."""
+    left = ""
+    if snapshot.expected is not None and not snapshot.manual:
+        rest = max(0.0, snapshot.expected - snapshot.elapsed)
+        left = f" · remaining {minutes(rest)}"
+    return f"Coil: {stop_text(snapshot.state, snapshot.coil).detail}{left}"
+
+
+def _lost(snapshot: Snapshot) -> str:
+    """What closing loses, named; "" where all is kept."""
+    queued = _named("queued run", snapshot.queued)
+    notes = _named("note", snapshot.notes, " for the next run")
+    parts = [f"<br>• {part}" for part in (queued, notes) if part]
+    return f"Closing loses{''.join(parts)}" if parts else ""
+
+
+def _named(noun: str, texts: Sequence[str], which: str = "") -> str:
+    """How many there are, and what the first of them are."""
+    if not texts:
+        return ""
+    count = f"a {noun}" if len(texts) == 1 else f"{len(texts)} {noun}s"
+    short = [t if len(t) <= LENGTH else f"{t[:LENGTH]} …" for t in texts[:NAMED]]
+    named = ", ".join(f"“{escape(text)}”" for text in short)
+    more = len(texts) - NAMED
+    named += f" and {more} more" if more > 0 else ""
+    return f"<b>{count}{which}</b>: {named}"

@@ -261,8 +261,9 @@ class Session(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether closing needs a question first."""
-        return self.run.alive or self.state.in_run or self.manual.alive
+        """Whether something has the coil, or is about to."""
+        begins = self._after_monitor is not None
+        return begins or self.run.alive or self.state.in_run or self.manual.alive
 
     @property
     def occupied(self) -> bool:
@@ -296,6 +297,8 @@ class Session(QObject):
             expected=self.run.expected,
             manual=self.manual.alive,
             known=self.bench.known,
+            queued=tuple(item.title for item in self.queue.items),
+            notes=tuple(self.run.waiting),
             fault=self.status.fault,
         )
 

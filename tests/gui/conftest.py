@@ -80,6 +80,7 @@ class Lab:
         session, window = self.session, self.window
         while session.queue.items:
             session.queue.remove(session.queue.items[0])
+        session.run.waiting.clear()
         for overlay in window.findChildren(Overlay):
             overlay.hide()
         self.until(self.in_front)  # another test may have had a window of its own
@@ -185,7 +186,7 @@ def opened(
         lab.until(lambda: not session.busy)
     lab.until(lambda: session.link.idle)
     session.status.fault = None
-    window.close()
+    window.leave()
     session.close()
     window.deleteLater()
     app.processEvents()

@@ -195,28 +195,6 @@ def test_nobody_is_said_to_be_well_while_a_run_is_stopped(lab, monkeypatch) -> N
     assert "Oscilloscope" in lamps and set(lamps.values()) == {Lamp.WAITING}
 
 
-def test_closing_while_running_asks_and_keeps_running_by_default(lab) -> None:
-    window, session = lab.window, lab.session
-    lab.run()
-    assert not window.close()
-    assert window.closing.isVisible() and window.closing.keep.isDefault()
-    QTest.keyClick(window, Qt.Key.Key_Escape)
-    assert not window.closing.isVisible()
-    assert session.state is WindowState.RUNNING, "Esc in the question is not STOP"
-    assert window.isVisible()
-
-
-def test_closing_can_be_declined_after_a_fault_on_closing(lab) -> None:
-    window = lab.window
-    lab.run()
-    window.closing.say("Stopping", "as while the window leaves")
-    window.closing.hide()  # as a fault leaves it
-    assert not window.close()
-    assert window.closing.keep.isVisible() and window.closing.keep.hasFocus()
-    assert window.closing.stop.isEnabled()
-    window.closing.keep.click()
-
-
 def test_pauses_are_none_of_the_steps_that_results_wait_for(lab, monkeypatch) -> None:
     window, run = lab.window, lab.session.run
     source = LiveSource(None, 1.0)
@@ -229,21 +207,6 @@ def test_pauses_are_none_of_the_steps_that_results_wait_for(lab, monkeypatch) ->
     monkeypatch.setattr(run, "expectation", expected)
     window.screen_.follow_run(source)
     assert window.review.results.mark.text() == "preliminary · 0 of 3 steps"
-
-
-def test_the_question_on_closing_tells_what_the_coil_does_now(lab) -> None:
-    window, session = lab.window, lab.session
-    lab.run()
-    lab.until(lambda: window.header.stop.truth is CoilKnowledge.LIVE)
-    assert not window.close()
-    window.closing.now.setText("as it was")
-    lab.until(lambda: window.closing.now.text() != "as it was")
-    coil = session.coil_view()
-    assert stop_text(session.state, coil).detail in window.closing.now.text()
-    session.stop("while it is asked")
-    lab.until(lambda: not session.busy)
-    lab.until(lambda: not window.closing.isVisible())
-    assert window.isVisible(), "nobody answered"
 
 
 def test_unplugged_coil_becomes_a_fault_that_says_what_to_do(lab) -> None:
