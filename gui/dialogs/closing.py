@@ -7,7 +7,7 @@ from html import escape
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QLabel, QWidget
 
 from gui.dialogs.overlay import Overlay
 from gui.look.icons import pixmap
@@ -42,12 +42,16 @@ class Closing(Overlay):
 
     def ask(self, snapshot: Snapshot, *, busy: bool) -> None:
         """Ask; says what happens to coil and data, and what is lost."""
+        for dialog in QApplication.topLevelWidgets():
+            if isinstance(dialog, QDialog) and dialog.isVisible():
+                dialog.close()  # a desktop keeps it above its window, and the question
         self._sign.setPixmap(pixmap("warning", self._theme.tokens.amber, 28))
         self.keep.show()
         self.stop.setEnabled(True)
         self._asking = True
         self.render_snapshot(snapshot, busy=busy)
         self.open()
+        self._window.activateWindow()
         self.keep.setDefault(True)
         self.keep.setFocus()
 

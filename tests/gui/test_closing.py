@@ -2,7 +2,9 @@
 
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog
 
+from gui.ask_file import ask_file
 from gui.look.theme import Theme
 from gui.session.queue import Queued
 from gui.session.session import Session
@@ -91,3 +93,16 @@ def test_who_closes_anyway_is_not_asked_again(lab, tmp_path) -> None:
     assert not window.isVisible()
     session.close()
     window.deleteLater()
+
+
+def test_the_question_is_not_covered_by_a_dialog(lab, tmp_path) -> None:
+    """A file dialog stays above the window it belongs to."""
+    window = lab.window
+    lab.run()
+    ask_file(window, "Save", print, start=str(tmp_path / "there.txt"), save=True)
+    (dialog,) = window.findChildren(QFileDialog)
+    lab.until(dialog.isVisible)
+    assert not window.close()
+    assert not dialog.isVisible() and window.closing.isVisible()
+    lab.until(window.closing.keep.hasFocus)
+    window.closing.keep.click()

@@ -16,7 +16,7 @@ from gui.lanes.expected import Preview, Stretch
 from gui.lanes.live import LiveSource
 from gui.lanes.source import PlanSource
 from gui.session.steps import facts_of
-from gui.state import CoilKnowledge, Lamp, WindowState, stop_text, truth
+from gui.state import CoilKnowledge, Lamp, WindowState, truth
 from sim_backend.serial_line import wires as serial_wires
 from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.acquisition.ending import Ending
