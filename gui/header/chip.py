@@ -16,7 +16,7 @@ from gui.state import InstrumentView, Lamp
 
 LAMPS = {
     Lamp.ABSENT: ("lamp-absent", look.LAMP_GREY, "not present"),
-    Lamp.WAITING: ("lamp-waiting", look.LAMP_AMBER, "connecting"),
+    Lamp.WAITING: ("lamp-waiting", look.LAMP_AMBER, "waiting"),
     Lamp.GOOD: ("lamp-good", look.LAMP_GREEN, "good"),
     Lamp.ACTIVE: ("lamp-active", look.LAMP_BLUE, "active"),
     Lamp.WARNING: ("lamp-warning", look.LAMP_AMBER, "attention"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from gui.session.bench import ROLES, ConnectedBench
+from gui.session.heard import Heard
 from gui.session.live_monitor import LiveMonitor
 from gui.session.live_run import LiveRun
 from gui.session.status import Status
@@ -117,29 +118,35 @@ class Chips:
             count = len(plan.needs.channels)
             words = f"{count} channel{'' if count == 1 else 's'} · 8 bit"
             if self._monitor.alive:
-                lamp, value = Lamp.ACTIVE, "monitor"
+                heard = self._monitor.answered.get("scope")
+                lamp, words, value = _in_use(heard, words, "monitor")
             elif self._status.state is WindowState.RUNNING:
-                lamp, value = Lamp.ACTIVE, show(rate, "S/s", 3)
+                heard = self._run.answered.get("scope")
+                lamp, words, value = _in_use(heard, words, show(rate, "S/s", 3))
         return InstrumentView(ROLES["scope"], lamp, words, value)
 
     def _meter(self) -> InstrumentView:
         lamp, words = self._found("meter")
         spec, field = self._bench.spec, self._run.field
         meter = None if spec is None else spec.field_meter
-        if meter is not None and meter.driver == "manual":
-            words = "a person reads it"
+        by_person = meter is not None and meter.driver == "manual"
+        words = "a person reads it" if by_person else _maker_and_model(words)
         value = "—"
         if self._status.state is WindowState.RUNNING and field is not None:
             lamp, value = Lamp.ACTIVE, show(round(field, 5), "T", 3)
-        return InstrumentView(ROLES["meter"], lamp, _maker_and_model(words), value)
+            if not by_person:  # who reads when asked, and is never late
+                heard = self._run.answered.get("meter")
+                lamp, words, value = _in_use(heard, words, value)
+        return InstrumentView(ROLES["meter"], lamp, words, value)
 
     def _thermometer(self) -> InstrumentView:
         lamp, words = self._found("thermometer")
+        words = _maker_and_model(words)
         value, kelvin = "—", self._run.kelvin
         if self._status.state is WindowState.RUNNING and kelvin is not None:
-            lamp, value = Lamp.ACTIVE, show(kelvin, "K", 5)
-        short = _maker_and_model(words)
-        return InstrumentView(ROLES["thermometer"], lamp, short, value)
+            heard = self._run.answered.get("thermometer")
+            lamp, words, value = _in_use(heard, words, show(kelvin, "K", 5))
+        return InstrumentView(ROLES["thermometer"], lamp, words, value)
 
     def _voltage(self, name: str, wanted: float) -> InstrumentView:
         """What the source of a voltage is to hold, V, and what it holds in a run."""
@@ -148,7 +155,8 @@ class Chips:
         if lamp not in (Lamp.ABSENT, Lamp.WAITING, Lamp.BAD):
             words = f"to hold {show(wanted, 'V', 5)}"
         if self._status.state is WindowState.RUNNING and held is not None:
-            lamp, value = Lamp.ACTIVE, show(held, "V", 5)
+            heard = self._run.answered.get(name)
+            lamp, words, value = _in_use(heard, words, show(held, "V", 5))
         return InstrumentView(ROLES[name], lamp, words, value)
 
     def _model(self, plan: Expectation) -> InstrumentView:
@@ -165,6 +173,15 @@ class Chips:
             lamp = Lamp.WARNING
         words = "in step" if seen.in_step else "beside the run"
         return InstrumentView("Model", lamp, words, f"NRMSE {seen.text}")
+
+
+def _in_use(heard: Heard | None, words: str, value: str) -> tuple[Lamp, str, str]:
+    """Lamp, words and value of what a task uses, as long as its last word says so."""
+    if heard is None:
+        return Lamp.WAITING, "not heard yet", "—"
+    if heard.overdue:
+        return Lamp.WAITING, f"silent for {heard.silent:.0f} s", "—"
+    return Lamp.ACTIVE, words, value
 
 
 def _maker_and_model(answer: str) -> str:

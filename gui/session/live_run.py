@@ -182,12 +182,15 @@ class LiveRun(LiveTask):
                 source.add_current(at, sent if read is None else read)
             case events.FieldRead(time=at, field=field):
                 self.field = field
+                self._answers("meter")
                 source.add_field(at, field)
             case events.TemperatureRead(time=at, kelvin=kelvin):
                 self.kelvin = kelvin
+                self._answers("thermometer")
                 source.add_reading("temperature", at, kelvin)
             case events.VoltageRead(name=name, held=held):
                 self.voltages[name] = held.voltage
+                self._answers(name)
             case events.TrialStarted():
                 self._trial_started(source, event)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
 
 from PySide6.QtCore import QObject
 
+from gui.session.heard import Heard
 from gui.session.log import Log
 from gui.session.status import Status
 from tactile_lab.acquisition.ending import CoilState, Ending
@@ -30,6 +31,7 @@ class LiveTask(QObject):
         coil: its state, as told last; None before the first word and after the end.
         heard: when that was, s; None where it cannot switch anything on: before it has
             begun, and after the end.
+        answered: role -> when that instrument was heard; none before its first word.
     """
 
     def __init__(self, link: Link, status: Status, log: Log) -> None:
@@ -38,6 +40,7 @@ class LiveTask(QObject):
         self.task: RemoteTask | None = None
         self.coil: CoilState | None = None
         self.heard: float | None = None
+        self.answered: dict[str, Heard] = {}
 
     @property
     def alive(self) -> bool:
@@ -69,6 +72,8 @@ class LiveTask(QObject):
             self.heard = time.monotonic()
         if isinstance(event, Samples):
             self.coil = event.coil
+            if event.bins:
+                self._answers("scope")
         self.hear(event)
 
     def _begin(
@@ -78,7 +83,15 @@ class LiveTask(QObject):
         **named: P.kwargs,
     ) -> None:
         self.coil = self.heard = None
+        self.answered = {}
         self.task = self._link.begin(self.take, act, *arguments, **named)
+
+    def _answers(self, role: str) -> None:
+        """An instrument has said something just now."""
+        if role in self.answered:
+            self.answered[role].word()
+        else:
+            self.answered[role] = Heard()
 
     @abstractmethod
     def hear(self, event: TaskEvent) -> None:

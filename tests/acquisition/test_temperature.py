@@ -222,12 +222,14 @@ def test_slices_of_any_size_show_the_same_warming_world():
 def test_its_chip_tells_who_it_is_and_what_it_reads(serial):
     from gui.session.chips import Chips
     from gui.session.expectation import expect
+    from gui.session.heard import Heard
     from gui.state import Lamp, WindowState
 
     answers = (InstrumentAnswer("thermometer", "LSCI,MODEL335,12/0,1.0", ""),)
     status = SimpleNamespace(state=WindowState.READY)
     bench = SimpleNamespace(answers=answers, age=0.0, known=True, field=None)
-    run = SimpleNamespace(voltages={}, kelvin=None, agreement=None)
+    answered = {"thermometer": Heard()}
+    run = SimpleNamespace(voltages={}, kelvin=None, agreement=None, answered=answered)
     chips = Chips(status, bench, run, SimpleNamespace(alive=False))
     plan = expect(serial())
 

@@ -162,12 +162,14 @@ def test_who_is_there_is_asked_of_every_source_and_none_is_switched_on(tmp_path)
 def test_the_chip_of_a_source_tells_what_it_is_to_hold_and_what_it_holds(scene):
     from gui.session.chips import Chips
     from gui.session.expectation import expect
+    from gui.session.heard import Heard
     from gui.state import Lamp, WindowState
 
     status = SimpleNamespace(state=WindowState.READY)
     answers = (InstrumentAnswer("V_GS", "KEITHLEY", ""),)
     bench = SimpleNamespace(answers=answers, age=0.0, known=True, field=None)
-    run = SimpleNamespace(voltages={}, agreement=None)
+    answered = {"V_GS": Heard()}
+    run = SimpleNamespace(voltages={}, agreement=None, answered=answered)
     chips = Chips(status, bench, run, SimpleNamespace(alive=False))
     plan = expect(scene(*HELD))
 

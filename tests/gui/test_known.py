@@ -3,16 +3,23 @@
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from PySide6.QtWidgets import QApplication
 from serial import serial_for_url
 from served_source import Source
 
+from gui.lanes.live import LiveSource
 from gui.session import bench as connected
+from gui.session import heard
+from gui.session.live_run import LiveRun
+from gui.session.log import Log
 from gui.session.session import Session
+from gui.session.status import Status
 from gui.state import (
     CoilKnowledge,
+    InstrumentView,
     Lamp,
     Snapshot,
     WindowState,
@@ -20,6 +27,9 @@ from gui.state import (
     run_problem,
     truth,
 )
+from tactile_lab.acquisition.events import FieldRead, TemperatureRead, VoltageRead
+from tactile_lab.engine.link import Link
+from tactile_lab.engine.request import Request
 
 LONGEST = 90.0
 
@@ -131,3 +141,63 @@ def test_what_answered_before_a_fault_is_not_green_after_it(served: Session) -> 
 def test_by_hand_is_not_called_ready() -> None:
     word, _ = clock_text(Snapshot(state=WindowState.READY, manual=True))
     assert word == "BY HAND"
+
+
+def scope_of(session: Session) -> InstrumentView:
+    chips = session.snapshot().instruments
+    return next(one for one in chips if one.name == "Oscilloscope")
+
+
+def test_a_scope_whose_samples_are_overdue_is_not_called_active(
+    lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that hangs was, until the run ended after 6 s."""
+    session = lab.session
+    long = Request(str(lab.folder / "long.toml"), (), "sim")
+    for begin in (
+        lambda: session.start(long, "Long", session.plan.expectation),
+        lambda: session.show_monitor(True),
+    ):
+        begin()
+        assert scope_of(session).lamp is not Lamp.ACTIVE, "nobody has heard it yet"
+        lab.until(lambda: scope_of(session).lamp is Lamp.ACTIVE)
+        with monkeypatch.context() as later:
+            later.setattr(heard, "monotonic", lambda: time.monotonic() + 100)
+            seen = scope_of(session)
+            assert seen.lamp is Lamp.WAITING and seen.value == "—"
+            assert seen.detail.startswith("silent for 1")
+        if session.busy:
+            session.stop("enough")
+            lab.until(lambda: session.state is WindowState.READY and not session.busy)
+
+
+def test_who_is_slow_is_not_overdue(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    monkeypatch.setattr(heard, "monotonic", lambda: clock[0])
+    one = heard.Heard()
+    clock[0] = 0.9
+    assert not one.overdue
+    clock[0] = 2.5
+    assert one.overdue and one.silent == 2.5
+    one.word()  # it is slow, and there
+    clock[0] = 7.0
+    assert not one.overdue
+    clock[0] = 7.6
+    assert one.overdue
+
+
+def test_readings_that_are_overdue_are_shown_no_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = [0.0]
+    monkeypatch.setattr(heard, "monotonic", lambda: clock[0])
+    run = LiveRun(Link(separate=False), Status(Log()), Log(), Path("runs"))
+    run.source = LiveSource(None, 1.0)
+    run.hear(TemperatureRead(0.0, 295.0))
+    run.hear(VoltageRead("V_GS", SimpleNamespace(voltage=1.4)))
+    run.hear(FieldRead(0.0, 0.01))
+    clock[0] = 0.5
+    assert not any(one.overdue for one in run.answered.values())
+    clock[0] = 3.0
+    assert all(one.overdue for one in run.answered.values())
+    assert set(run.answered) == {"thermometer", "V_GS", "meter"}

@@ -1,0 +1,35 @@
+"""When an instrument was heard last, and whether its next word is overdue."""
+
+from __future__ import annotations
+
+from time import monotonic
+
+DUE = 1.0
+"""Silence, s, up to which the last word of an instrument says how it is now."""
+
+
+class Heard:
+    """Words of one instrument while a task uses it, from its first on.
+
+    One that is slow, as a scope that reads records is, has been silent before: its
+    word is overdue after twice its longest silence so far.
+    """
+
+    def __init__(self) -> None:
+        self._last = monotonic()
+        self._longest = 0.0
+
+    def word(self) -> None:
+        """It said something again just now."""
+        self._longest = max(self._longest, self.silent)
+        self._last = monotonic()
+
+    @property
+    def silent(self) -> float:
+        """How long it has said nothing, s."""
+        return monotonic() - self._last
+
+    @property
+    def overdue(self) -> bool:
+        """Whether its last word does not say any more how it is."""
+        return self.silent > max(DUE, 2 * self._longest)
