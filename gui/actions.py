@@ -310,7 +310,7 @@ class Actions(QObject):
         """Export what the lanes show."""
         from gui.dialogs.saving import export_view
 
-        export_view(self.panels, self.screen)
+        export_view(self.panels)
 
     def ask_skin(self) -> None:
         """Ask for an array of sensors and show it in a window of its own."""

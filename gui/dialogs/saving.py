@@ -33,7 +33,6 @@ from tactile_lab.whole_file import failing_as, replacing, write_text
 
 if TYPE_CHECKING:
     from gui.screen.panels import Panels
-    from gui.screen.screen import Screen
 
 TITLE, LEGEND = 34, 20
 """Heights of the title, and of the names of several runs below it, px."""
@@ -60,29 +59,26 @@ def write_scene(panels: Panels, path: Path) -> None:
         write_text(path, panels.setup.request().load().to_toml())
 
 
-def export_view(panels: Panels, screen: Screen) -> None:
+def export_view(panels: Panels) -> None:
     """Ask where, and export what the lanes show by then."""
     ask_file(
         panels.centre.window(),
         "Export this view",
-        lambda path: write_view(panels, screen.run, path),
+        lambda path: write_view(panels, path),
         kinds="Picture or table (*.png *.svg *.csv)",
         start="view.png",
         save=True,
     )
 
 
-def write_view(panels: Panels, run: Source | None, path: Path) -> None:
+def write_view(panels: Panels, path: Path) -> None:
     """Write the visible time of all visible lanes; the ending chooses the format."""
     stack = panels.centre.stack
-    simulated = panels.session.bench.spec is None or panels.session.bench.spec.simulated
-    if run is not None:
-        simulated = run.simulated
     title = panels.session.name or "plan"
     bar = panels.centre.compare_bar
-    if run is not None and bar.comparison is run:
+    if bar.comparison is not None and bar.comparison is stack.source:
         title += f", {bar.comparison.layout.value}"
-    title += " · SIMULATED" if simulated else " · measured"
+    title += " · SIMULATED" if stack.source.simulated else " · measured"
     with _telling(panels, "export", path), replacing(path) as part:
         ending = path.suffix.lower()
         if ending == ".csv":

@@ -203,7 +203,7 @@ class Member:
 class PlanSource(Source):
     """No data yet: the plan and what the model expects of it."""
 
-    running = True
+    running = simulated = True
     length = 0.0
     holds: list[Stretch] = []  # noqa: RUF012
     twin_spikes = NONE

@@ -11,7 +11,7 @@ from gui.session.status import Status
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.events import CoilCurrent, Message, RunState, StateChanged
 from tactile_lab.engine.commands import begin_manual, hold, renew
-from tactile_lab.engine.events import Samples, TaskEvent
+from tactile_lab.engine.events import Begun, Samples, TaskEvent
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
 
@@ -49,7 +49,9 @@ class LiveManual(LiveTask):
 
     def hear(self, event: TaskEvent) -> None:
         """Note what the coil does; each word is answered by renewing the lease."""
-        if isinstance(event, StateChanged):
+        if isinstance(event, Begun) and self.source is not None:
+            self.source.simulated = event.simulated
+        elif isinstance(event, StateChanged):
             self.opened = self.opened or event.state is RunState.READY
         elif isinstance(event, CoilCurrent):
             self._status.coil.sign_of_life()

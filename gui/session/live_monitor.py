@@ -63,6 +63,7 @@ class LiveMonitor(LiveTask):
         if isinstance(event, Begun):
             self._critical = event.critical_V_C1
             self.source = LiveSource(None, event.newtons_per_ampere)
+            self.source.simulated = event.simulated
             self.begun.emit(self.source)
         elif source is not None and isinstance(event, Samples):
             source.add_bins(event.bins)

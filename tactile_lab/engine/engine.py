@@ -320,6 +320,7 @@ class ServedTask:
                 limits=None if coil is None else coil.limits,
                 newtons_per_ampere=magnet.newtons_per_ampere,
                 critical_V_C1=task.scene.circuit.critical_V_C1,
+                simulated=task.scene.bench.simulated,
             )
         )
         return self._run(task)

@@ -24,12 +24,14 @@ class Begun:
         limits: of the coil; None without one.
         newtons_per_ampere: turns coil current into force.
         critical_V_C1: the sensor fires below it, V.
+        simulated: whether its bench is.
     """
 
     folder: Path | None
     limits: CoilLimits | None
     newtons_per_ampere: float
     critical_V_C1: float
+    simulated: bool
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,7 +36,7 @@ class Told:
     def begin(self, task: LiveTask, *, told: bool = True) -> None:
         self.task, task.task = task, RemoteTask(0, lambda *_: None)
         if told:
-            task.take(Begun(None, LIMITS, 0.2, 1.0))
+            task.take(Begun(None, LIMITS, 0.2, 1.0, True))
 
     def tell(self, **known: object) -> None:
         self.task.take(Samples({}, CoilState(**known)))
@@ -91,7 +91,7 @@ def test_off_is_claimed_in_a_run_only_while_the_engine_tells_so(told: Told) -> N
     told.begin(told.session.run, told=False)
     told.now += 60.0
     assert told.known is OFF, "it plans: nothing is held before it has begun"
-    told.session.run.take(Begun(None, LIMITS, 0.2, 1.0))
+    told.session.run.take(Begun(None, LIMITS, 0.2, 1.0, True))
     told.tell()
     assert told.known is OFF
     told.now += STALE + 0.1

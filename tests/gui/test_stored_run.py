@@ -1,6 +1,7 @@
 """Runs on disk in the lanes: opened, looked at closely, exported."""
 
 import threading
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from PySide6.QtSvg import QSvgRenderer
 
 from gui.dialogs.saving import table, write_scene, write_view
 from gui.lanes import stored
+from gui.lanes.source import PlanSource
 from gui.session.steps import of_run
 from tactile_lab.report.from_run import read
 from tactile_lab.trace import Trace
@@ -143,24 +145,24 @@ def test_dropped_scene_is_loaded_and_dropped_run_is_opened(lab) -> None:
 def test_view_is_exported(lab) -> None:
     window, folder = lab.window, lab.folder
     for name in ("view.png", "view.svg", "VIEW.CSV", "view.csv"):
-        write_view(window.panels, None, folder / name)
+        write_view(window.panels, folder / name)
         assert (folder / name).stat().st_size > 100
     assert QSvgRenderer(str(folder / "view.svg")).isValid()
     before = {file: file.read_bytes() for file in folder.glob("view.*")}
     write_scene(window.panels, folder / "saved.toml")
     notice = window.centre.notice
-    write_view(window.panels, None, folder / "view.what")
+    write_view(window.panels, folder / "view.what")
     assert f"{folder / 'view.what'} was not saved" in notice.text()
     assert "End it in .png" in notice.text()
     for file in before:
         inside = file / "in a file.png"
-        write_view(window.panels, None, inside)
+        write_view(window.panels, inside)
         assert f"{inside} was not saved" in window.session.log.lines[-1].text
         assert notice.text() == window.session.log.lines[-1].text
         write_scene(window.panels, folder / "saved.toml")
         assert not notice.isVisible()
         with full_after(50):
-            write_view(window.panels, None, file)
+            write_view(window.panels, file)
             write_scene(window.panels, folder / "saved.toml")
         assert "not saved" in window.session.log.lines[-1].text
         assert file.read_bytes() == before[file]
@@ -170,3 +172,30 @@ def test_view_is_exported(lab) -> None:
     header = (folder / "view.csv").read_text().splitlines()[1]
     assert "V_C1_time_s" in header and "force_mean_N" in header
     assert 'name = "pulses"' in (folder / "saved.toml").read_text()
+
+
+def test_an_export_is_stamped_by_the_bench_that_recorded_it(lab, monkeypatch) -> None:
+    """It was by the one that is connected now."""
+    window, session, file = lab.window, lab.session, lab.folder / "stamped.csv"
+
+    def stamp() -> str:
+        write_view(window.panels, file)
+        return file.read_text().splitlines()[0]
+
+    session.show_monitor(True)
+    lab.until(lambda: session.monitor.source is not None)
+    session.show_monitor(False)
+    lab.until(lambda: not session.monitor.alive)
+    measured = copy(session.bench.spec)
+    object.__setattr__(measured, "simulated", False)
+    monkeypatch.setattr(session.bench, "spec", measured)
+    assert "Monitor · SIMULATED" in stamp()
+    lab.run()
+    assert "SIMULATED" in stamp()
+    window.centre.tools.freeze.setChecked(True)
+    assert "SIMULATED" in stamp()
+    window.centre.tools.freeze.setChecked(False)
+    session.source.simulated = False
+    assert "measured" in stamp()
+    window.centre.stack.show_source(PlanSource(session.plan.expectation.preview))
+    assert "SIMULATED" in stamp(), "the model computed it"
