@@ -16,11 +16,12 @@ from gui.lanes.tools import Tools
 from gui.lanes.view import TimeView
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
-from gui.parts import STRETCH, column, empty, label, line, panel, push, row, say
+from gui.parts import STRETCH, column, empty, label, line, panel, push, row
 from gui.record.log import LogView
 from gui.record.monitor_bar import MonitorBar
 from gui.record.progress import ProgressStrip
 from gui.screen.compare_bar import CompareBar
+from gui.screen.notice import Notice
 
 LATER = 0.05
 """By how much the record may have a step begin later than was told live, s."""
@@ -169,9 +170,7 @@ class Centre(QWidget):
         self.progress = ProgressStrip(theme)
         self.log = LogView(theme)
         self.lanes = panel()
-        self.notice = label("", "muted", wrap=True)
-        self.notice.setContentsMargins(14, 6, 14, 6)
-        self.notice.hide()
+        self.notice = Notice()
         self.compare_bar = CompareBar(self.stack, self.view, theme)
         self.monitor_bar = MonitorBar()
         bars = (self.tools, line(), self.notice, self.compare_bar, self.monitor_bar)
@@ -266,7 +265,7 @@ class Centre(QWidget):
 
     def say(self, problem: str) -> None:
         """Say something above the lanes; "" takes it away."""
-        say(self.notice, problem)
+        self.notice.say(problem)
 
     def _show_lanes(self, lanes: Sequence[Lane] | None) -> None:
         if lanes is not None:

@@ -199,3 +199,22 @@ def test_an_export_is_stamped_by_the_bench_that_recorded_it(lab, monkeypatch) ->
     assert "measured" in stamp()
     window.centre.stack.show_source(PlanSource(session.plan.expectation.preview))
     assert "SIMULATED" in stamp(), "the model computed it"
+
+
+def test_a_long_path_above_the_lanes_is_shortened_in_its_middle(lab) -> None:
+    """Its end, which names the file, was cut off."""
+    window, notice = lab.window, lab.window.centre.notice
+    path = f"/{'a folder/' + 'long' * 80}/view.png"
+    before = window.centre.lanes.minimumSizeHint().width()
+    window.centre.say(f"{path} was not saved: the disk is full.")
+    lab.app.processEvents()
+    assert window.centre.lanes.minimumSizeHint().width() == before
+    shown = notice.text()
+    widest = max(map(notice.fontMetrics().horizontalAdvance, shown.split()))
+    assert widest <= notice.contentsRect().width()
+    assert "…" in shown and "/view.png was not saved: the disk is full." in shown
+    assert path in notice.toolTip()
+    window.centre.say("The disk is full.")
+    assert (notice.text(), notice.toolTip()) == ("The disk is full.", "")
+    window.centre.say("")
+    assert not notice.isVisible()
