@@ -16,8 +16,8 @@ by so much since, A."""
 
 
 def unmarked(text: str) -> str:
-    """A message without the back-ticks by which a terminal marks commands."""
-    return text.replace("`", "")
+    """A message as a window says it: no back-ticks of a terminal, and no options."""
+    return text.replace("`", "").replace("with --out", "in Settings")
 
 
 class WindowState(Enum):

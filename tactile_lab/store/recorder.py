@@ -352,7 +352,8 @@ class Recorder:
             raise RecordingError(
                 f"{self.folder.path / DATA} cannot be written: {error}. The first "
                 f"{kept} samples per channel are kept; free space on the disk or "
-                "choose another --out, and run `tactile-lab recover` on this run."
+                "choose another folder with --out, and run `tactile-lab recover` on "
+                "this run."
             ) from error
 
 

@@ -195,6 +195,20 @@ def test_nobody_is_said_to_be_well_while_a_run_is_stopped(lab, monkeypatch) -> N
     assert "Oscilloscope" in lamps and set(lamps.values()) == {Lamp.WAITING}
 
 
+def test_a_folder_that_cannot_be_written_is_told_as_the_window_sets_it(lab) -> None:
+    """It named --out, which is of the command line."""
+    window, session, out = lab.window, lab.session, lab.session.out
+    session.keep_in(lab.folder / "short.toml" / "runs")  # within a file
+    window.setup.run.click()
+    lab.until(lambda: session.state is WindowState.FAULT)
+    session.keep_in(out)
+    told = session.status.fault.consequence
+    assert "Choose a writable folder in Settings" in told and "--out" not in told
+    lines = [line.text for line in session.log.lines[-4:]]
+    assert any("in Settings" in line for line in lines)
+    assert not any("--out" in line for line in lines)
+
+
 def test_pauses_are_none_of_the_steps_that_results_wait_for(lab, monkeypatch) -> None:
     window, run = lab.window, lab.session.run
     source = LiveSource(None, 1.0)
