@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
@@ -61,10 +62,14 @@ def ask_file(
         dialog.selectFile(start)
 
     def chosen(name: str) -> None:
-        if save and Path(name).exists():
-            _ask_to_replace(parent.window(), Path(name), then)
+        path = Path(name)
+        if save and path.exists():
+            again = partial(ask_file, parent, title, then, kinds=kinds, save=True)
+            _ask_to_replace(
+                parent.window(), path, lambda: then(path), lambda: again(start=name)
+            )
         else:
-            then(Path(name))
+            then(path)
 
     dialog.fileSelected.connect(chosen)
     _accept_what_is_typed(dialog)
@@ -95,18 +100,21 @@ def _forget(dialog: QFileDialog) -> None:
 
 
 def _ask_to_replace(
-    window: QWidget, path: Path, then: Callable[[Path], object]
+    window: QWidget,
+    path: Path,
+    replace: Callable[[], object],
+    again: Callable[[], object],
 ) -> None:
-    buttons = QMessageBox.StandardButton
-    box = QMessageBox(
-        QMessageBox.Icon.Warning,
-        "Replace the file?",
-        f"{path.name} exists already.\nDo you want to replace it?",
-        buttons.Yes | buttons.No,
-        window,
-    )
+    """Ask once; Return and Esc lead back to the dialog, and lose nothing."""
+    box = QMessageBox(window)
+    box.setIcon(QMessageBox.Icon.Warning)
+    box.setWindowTitle("Replace the file?")
+    box.setText(f"{path.name} exists already.\nDo you want to replace it?")
+    do = box.addButton("Replace", QMessageBox.ButtonRole.DestructiveRole)
+    other = box.addButton("Choose another name", QMessageBox.ButtonRole.RejectRole)
     box.setModal(False)
-    box.setDefaultButton(buttons.No)
+    box.setDefaultButton(other)
     box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-    box.accepted.connect(lambda: then(path))
+    do.clicked.connect(replace)
+    other.clicked.connect(again)
     box.show()
