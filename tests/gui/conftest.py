@@ -81,6 +81,8 @@ class Lab:
         while session.queue.items:
             session.queue.remove(session.queue.items[0])
         session.run.waiting.clear()
+        window.preferences.keep(folder=str(session.out), reports=False)
+        session.run.reports = False  # a test may have set other preferences
         for overlay in window.findChildren(Overlay):
             overlay.hide()
         self.until(self.in_front)  # another test may have had a window of its own
@@ -175,7 +177,6 @@ def opened(
     theme = Theme("light")
     theme.apply()
     session = Session(folder / "runs", separate=False, realtime=False)
-    session.run.reports = False
     window = Window(session, theme)
     window.show()
     begin(window, str(folder / "short.toml"), "sim")

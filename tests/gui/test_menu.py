@@ -66,6 +66,18 @@ def test_settings_act_at_once(lab) -> None:
     assert session.out == out
 
 
+def test_no_report_is_written_for_tests_that_follow(lab) -> None:
+    """Each preference that was set turned them on again for all of the process."""
+    lab.window.preferences.set(sound=False)
+    assert not lab.session.run.reports
+    lab.window.preferences.set(reports=True)
+    assert lab.session.run.reports
+    lab.ready()
+    assert not lab.session.run.reports
+    lab.window.preferences.set(sound=False)
+    assert not lab.session.run.reports
+
+
 def test_the_menu_leaves_stop_uncovered(lab) -> None:
     """It lay over the lower edge of STOP."""
     lab.window.actions_.show_menu()
