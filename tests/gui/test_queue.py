@@ -4,31 +4,16 @@ from importlib import resources
 
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLineEdit
+from queued import busy, idle, idle_after_run, three_waiting, waiting
 
 from gui.look.theme import Theme
 from gui.parts import IconButton
 from gui.session.queue import Queued
 from gui.setup.queue import QueueView
 from gui.state import WindowState
-from gui.tab_order import scroll
 from tactile_lab.engine.request import Request
-from tactile_lab.scene.load import load
 
 BUILT_IN = resources.files("tactile_lab.scene").joinpath("simulated_bench.toml")
-
-
-def busy(lab) -> None:
-    """As while a run is in progress, without one."""
-    lab.session.run.request = lab.window.setup.request()
-    lab.session.status.enter(WindowState.RUNNING)
-
-
-def idle(lab) -> None:
-    lab.session.queue.items.clear()
-    lab.session.queue.held = False
-    lab.session.queue.changed.emit()
-    lab.session.status.enter(WindowState.READY)
 
 
 def test_dropped_scene_and_run_wait_with_their_cost(lab) -> None:
@@ -105,123 +90,6 @@ def test_rows_are_moved_and_taken_out_by_their_buttons(lab) -> None:
     idle(lab)
 
 
-def three_waiting(lab) -> None:
-    """One, two and three wait, like the form but for the hold: 1, 2 and 3 s."""
-    session, asked = lab.session, lab.window.setup.request()
-    busy(lab)
-    for number, title in enumerate(("one", "two", "three"), start=1):
-        hold = (*asked.overrides, f'protocol.hold="{number} s"')
-        session.queue.add(Queued(title, Request(asked.path, hold, asked.bench)))
-    lab.until(lambda: all(item.expectation for item in session.queue.items))
-
-
-def type_into(field, text: str) -> None:
-    edit = field.findChild(QLineEdit)
-    edit.selectAll()
-    QTest.keyClicks(edit, text)
-
-
-def test_queued_run_is_edited_in_place_while_a_run_is_in_progress(lab) -> None:
-    session, setup = lab.session, lab.window.setup
-    before = setup.form.texts()
-    lab.run()
-    lab.until(lambda: session.state is WindowState.RUNNING)
-    three_waiting(lab)
-    shorter = session.queue.items[1].expectation.estimate.duration
-    QTest.mouseClick(setup.queue.cards[1], Qt.MouseButton.LeftButton)
-    assert setup.form.field("hold").text == "2 s"
-    assert "two, 2 of 3" in setup.strip.text()
-    assert not setup.run.isVisible() and setup.buttons.save.isVisible()
-    type_into(setup.form.field("hold"), "7 s")
-    setup.buttons.save.click()
-    lab.until(lambda: setup.subject.edited is None)
-    item = session.queue.items[1]
-    assert [i.title for i in session.queue.items] == ["one", "two", "three"]
-    assert item.request.load().protocol.hold == 7.0
-    assert item.expectation.estimate.duration > shorter + 9, (
-        "two holds, 5 s longer each"
-    )
-    assert setup.form.texts() == before, "the form shows the next run again"
-    assert session.state is WindowState.RUNNING and not setup.run.isEnabled()
-    idle_after_run(lab)
-
-
-def idle_after_run(lab) -> None:
-    lab.session.queue.items.clear()
-    lab.session.stop("test is over")
-    lab.until(lambda: lab.session.state is WindowState.READY)
-    idle(lab)
-
-
-def test_cancel_leaves_queue_and_form_as_they_were(lab) -> None:
-    session, setup = lab.session, lab.window.setup
-    setup.form.propose({"hold": "800 ms"})
-    before = setup.form.texts()
-    three_waiting(lab)
-    asked = [item.request for item in session.queue.items]
-    scroll(setup, 1)
-    setup.queue.cards[2].setFocus()
-    QTest.keyClick(setup.queue.cards[2], Qt.Key.Key_Return)
-    assert setup.form.field("hold").text == "3 s"
-    first = setup.form.fields[0].findChild(QLineEdit)
-    lab.until(first.hasSelectedText)  # what is typed now replaces it
-    assert not first.visibleRegion().isEmpty(), "the keyboard is where nobody sees it"
-    type_into(setup.form.field("hold"), "9 s")
-    setup.edit(session.queue.items[0])
-    assert "First save or cancel" in setup.strip.text()
-    assert setup.form.field("hold").text == "9 s", "nothing typed is lost by a click"
-    setup.buttons.cancel.click()
-    assert setup.form.texts() == before
-    assert [item.request for item in session.queue.items] == asked
-    idle(lab)
-    setup.form.edits.undo()
-
-
-def test_edits_of_a_run_that_starts_or_goes_are_kept_in_the_form(
-    lab, monkeypatch
-) -> None:
-    session, setup = lab.session, lab.window.setup
-    started: list[str] = []
-    monkeypatch.setattr(
-        session, "start", lambda request, title, plan: started.append(title)
-    )
-    three_waiting(lab)
-    setup.edit(session.queue.items[0])
-    type_into(setup.form.field("hold"), "8 s")
-    session.status.enter(WindowState.READY)
-    session.queue.next()
-    assert started == ["one"]
-    assert "one has started with the parameters it had" in setup.strip.text()
-    assert "Your changes stay" in setup.strip.text()
-    assert setup.form.field("hold").text == "8 s" and setup.buttons.run.isVisible()
-    busy(lab)
-    setup.edit(session.queue.items[0])
-    assert setup.form.field("hold").text == "2 s"
-    session.queue.remove(session.queue.items[0])
-    assert "two was taken out" in setup.strip.text()
-    assert setup.form.field("hold").text == "8 s", "nothing was changed: back again"
-    idle(lab)
-
-
-def test_edit_that_cannot_run_is_not_saved(lab) -> None:
-    session, setup = lab.session, lab.window.setup
-    three_waiting(lab)
-    setup.edit(session.queue.items[0])
-    type_into(setup.form.field("hold"), "0 s")
-    save = setup.buttons.save
-    assert not save.isEnabled() and "above" in save.toolTip()
-    type_into(setup.form.field("hold"), "1 s")
-    type_into(setup.form.field("levels"), "5 N")
-    lab.until(lambda: "reach" in session.plan.problem)
-    assert "reachable" in save.toolTip()
-    setup.save()
-    assert setup.subject.edited is session.queue.items[0]
-    setup.start()
-    assert session.state is WindowState.RUNNING and len(session.queue.items) == 3
-    setup.buttons.cancel.click()
-    idle(lab)
-
-
 def test_moved_run_keeps_the_keyboard(lab) -> None:
     window, session = lab.window, lab.session
     three_waiting(lab)
@@ -235,58 +103,6 @@ def test_moved_run_keeps_the_keyboard(lab) -> None:
     QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Delete)
     assert [item.title for item in session.queue.items] == ["two", "three"]
     idle(lab)
-
-
-def test_edited_run_is_executed_as_it_was_saved(lab) -> None:
-    session, setup = lab.session, lab.window.setup
-    lab.run()
-    setup.enqueue()
-    lab.until(lambda: len(session.queue.items) == 1)
-    setup.edit(session.queue.items[0])
-    type_into(setup.form.field("hold"), "250 ms")
-    setup.enqueue()  # Ctrl+Return saves while a run is edited, once it is planned
-    lab.until(lambda: setup.subject.edited is None)
-    assert len(session.queue.items) == 1
-    first = session.run.folder
-    session.stop("the next one follows when asked for")
-    lab.until(lambda: session.state is WindowState.READY)
-    setup.queue.resume.click()
-    lab.until(
-        lambda: session.run.folder != first and session.state is WindowState.READY
-    )
-    assert load(session.run.folder / "scene.toml").protocol.hold == 0.25
-
-
-def test_scene_opened_during_an_edit_leaves_the_queued_run_alone(lab) -> None:
-    session, setup = lab.session, lab.window.setup
-    three_waiting(lab)
-    asked = session.queue.items[0].request
-    setup.edit(session.queue.items[0])
-    type_into(setup.form.field("hold"), "9 s")
-    setup.open_scene(str(lab.folder / "short.toml"))
-    assert setup.subject.edited is None and session.queue.items[0].request == asked
-    assert "one waits unchanged" in setup.strip.text()
-    idle(lab)
-
-
-def test_the_next_runs_are_prepared_during_one(lab) -> None:
-    """Edit, queue, edit, queue, while a run is in progress."""
-    session, setup = lab.session, lab.window.setup
-    lab.run()
-    running = session.run.request
-    lab.window.screen_.open_scene(str(lab.folder / "short.toml"))
-    for hold in ("250 ms", "350 ms"):
-        type_into(setup.form.field("hold"), hold)
-        setup.buttons.queue.click()
-        lab.until(lambda h=hold: h in " ".join(i.title for i in waiting(lab)))
-    assert [i.request.load().protocol.hold for i in waiting(lab)] == [0.25, 0.35]
-    assert session.state is WindowState.RUNNING and session.run.request == running
-    assert "Your next run" in setup.strip.text()
-    idle_after_run(lab)
-
-
-def waiting(lab) -> list[Queued]:
-    return lab.session.queue.items
 
 
 def test_queue_only_queues_where_nothing_is_in_progress(lab) -> None:
@@ -303,28 +119,6 @@ def test_queue_only_queues_where_nothing_is_in_progress(lab) -> None:
     setup.queue.resume.click()
     assert session.state is WindowState.RUNNING and len(waiting(lab)) == 1
     idle_after_run(lab)
-
-
-def test_one_undo_takes_back_what_was_typed_in_one_stay(lab) -> None:
-    setup = lab.window.setup
-    edit = setup.form.field("hold").findChild(QLineEdit)
-    before = edit.text()
-    lab.window.activateWindow()
-    edit.setFocus()
-    lab.until(edit.hasFocus)
-    type_into(setup.form.field("hold"), "600 ms")
-    assert edit.hasFocus() and edit.text() == "600 ms"
-    QTest.keyClick(edit, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    lab.until(lambda: edit.text() == before)
-    QTest.keyClick(edit, Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier)
-    lab.until(lambda: edit.text() == "600 ms")
-    undo = Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier
-    lab.window.actions_.show_help()
-    QTest.keyClick(lab.window, *undo)
-    assert edit.text() == "600 ms", "not where a card hides the form"
-    QTest.keyClick(lab.window, Qt.Key.Key_Escape)
-    QTest.keyClick(lab.window, *undo)
-    lab.until(lambda: edit.text() == before)
 
 
 def test_queue_can_be_edited_while_running(lab) -> None:
@@ -349,24 +143,6 @@ def test_queue_can_be_edited_while_running(lab) -> None:
     session.queue.resume()
     lab.until(lambda: session.queue.items == [] and session.state is WindowState.READY)
     assert session.run.folder != first
-
-
-def test_invalid_value_forbids_run_and_says_why(lab) -> None:
-    window = lab.window
-    window.setup.form.field("hold").put("−1 s")
-    window.setup.form.changed.emit()
-    assert not window.setup.run.isEnabled()
-    assert "Hold" in window.setup.run.toolTip()
-
-
-def test_force_beyond_the_coil_forbids_run_with_the_plans_words(lab) -> None:
-    window, session = lab.window, lab.session
-    window.setup.form.field("levels").put("900 mN")
-    window.setup.plan_now()
-    lab.until(lambda: session.plan.problem)
-    assert "reachable" in session.plan.problem
-    assert not window.setup.run.isEnabled()
-    window.setup.form.reset()
 
 
 def test_two_waiting_runs_are_seen_in_a_low_panel_and_three_in_a_high_one(app) -> None:
