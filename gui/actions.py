@@ -163,7 +163,7 @@ class Actions(QObject):
             Shortcut("Ctrl+R", "Run", panels.setup.start),
             Shortcut("Ctrl+Return", "Queue; save a queued run", panels.setup.enqueue),
             Shortcut(
-                "Ctrl+Shift+Return", "Start the queue", panels.session.queue.resume
+                "Ctrl+Shift+Return", "Start the queue", panels.session.start_queue
             ),
             Shortcut("Space", "Freeze the display", tools.freeze.click),
             Shortcut("F", "Follow", tools.follow.click),

@@ -180,6 +180,25 @@ class Session(QObject):
         self.queue.add(Queued(title, request))
         return ""
 
+    def start_queue(self) -> None:
+        """Start the queue, or go on with it after a STOP or a fault.
+
+        Where nothing could begin now it stays held: to connect a bench, to acknowledge
+        a fault or to let go of the coil would else begin a run later, unasked.
+        """
+        reason = ""
+        if self.state is WindowState.DISCONNECTED:
+            reason = "Connect a bench first."
+        elif self.state is WindowState.FAULT:
+            reason = "Acknowledge the fault first."
+        elif self.manual.alive:
+            reason = "Let go of the coil that is driven by hand first."
+        if not reason:
+            self.queue.resume()
+        elif self.queue.items:
+            self.queue.hold()
+            self.log.add(Severity.WARNING, "queue", f"Nothing starts. {reason}")
+
     def begin_manual(self) -> None:
         """Open the coil source to drive it by hand."""
         if self._free and self.bench.request and self.bench.spec:

@@ -110,7 +110,7 @@ class SetupPanel(QFrame):
         queue.edited.connect(self.edit)
         queue.removed.connect(session.queue.remove)
         queue.moved.connect(session.queue.move)
-        queue.resumed.connect(session.queue.resume)
+        queue.resumed.connect(session.start_queue)
         session.queue.changed.connect(self._show_queue)
         session.plan.arrived.connect(self._planned)
         session.stopped.connect(self._wait_no_more)
