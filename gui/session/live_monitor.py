@@ -80,8 +80,7 @@ class LiveMonitor(LiveTask):
             words = f"The monitor was refused. {ending.reason}"
             self._log.add(Severity.ERROR, "monitor", words)
         elif ending.state is events.RunState.FAULTED:
-            words = f"The monitor ended. {ending.reason}"
-            self._log.add(Severity.ERROR, "monitor", words)
+            self._status.set_fault("The monitor ended.", ending.reason or "")
         self.ended.emit()
 
     @property

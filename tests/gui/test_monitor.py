@@ -1,8 +1,12 @@
 """The sensor watched between runs."""
 
+from typing import Any
+
 from PySide6.QtGui import QCloseEvent
 
-from gui.state import CoilKnowledge, WindowState
+from gui.state import CoilKnowledge, Lamp, WindowState
+from sim_backend.picoscope import sdk
+from sim_backend.picoscope.faults import ScopeFault
 from tactile_lab.store.run import Run
 
 
@@ -84,3 +88,30 @@ def test_the_window_stays_until_what_is_recorded_is_kept(lab) -> None:
     window.closeEvent(closing)
     assert not closing.isAccepted()
     window._leaving = session.monitor.recording = False
+
+
+def test_a_scope_that_is_unplugged_while_it_is_watched_is_a_fault(
+    lab, monkeypatch
+) -> None:
+    """The window stayed ready, its scope green, and a queued run would have begun."""
+    window, session = lab.window, lab.session
+    pulled = (ScopeFault(kind="unplug", sample=50_000),)
+
+    class Pulled(sdk.FakePs3000a):
+        def __init__(
+            self, wired: Any, clock: Any, make: Any, _: Any, generator: Any
+        ) -> None:
+            super().__init__(wired, clock, make, pulled, generator)
+
+    with monkeypatch.context() as once:
+        once.setattr(sdk, "FakePs3000a", Pulled)
+        session.show_monitor(True)
+        lab.until(lambda: session.monitor.source is not None)
+        lab.until(lambda: not session.monitor.alive)
+    assert session.state is WindowState.FAULT
+    assert "does not answer" in session.status.fault.consequence
+    lamps = {one.name: one.lamp for one in session.snapshot().instruments}
+    assert lamps["Oscilloscope"] is not Lamp.GOOD
+    assert window.header.stop.truth is CoilKnowledge.OFF, "nothing drove the coil"
+    window.banner.acknowledge.click()
+    lab.until(lambda: session.state is WindowState.READY)
