@@ -29,6 +29,9 @@ CARD = 164
 """Width, px."""
 
 MARGIN, RIGHT = 12, 6
+SWATCH, GAP = 10, 7
+"""Of the title: its swatch, and what is between its parts, px."""
+
 TITLE = 26
 """Height of the title with the margin above it, px."""
 
@@ -94,7 +97,7 @@ class LaneCard(QFrame):
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.setAccessibleName(f"Lane {lane.plain}")
         self._swatch = QLabel()
-        self._swatch.setFixedSize(QSize(10, 10))
+        self._swatch.setFixedSize(QSize(SWATCH, SWATCH))
         self.setMouseTracking(True)
         self._held: tuple[bool, float] | None = None
         self._flat = not lane.valued
@@ -106,8 +109,9 @@ class LaneCard(QFrame):
         self._beside = label("", "muted")
         self._beside.hide()
         number_ = (self._value, self._unit)
-        heading = (self._swatch, label(lane.title, "strong"), self._beside, STRETCH)
-        title = row(*heading, *(number_ if self._flat else ()), spacing=7)
+        self._title = label(lane.title, "strong")
+        heading = (self._swatch, self._title, self._beside, STRETCH)
+        title = row(*heading, *(number_ if self._flat else ()), spacing=GAP)
         value = row(*(() if self._flat else (*number_, STRETCH)), spacing=5)
         words = column(self, title, value, self._more, STRETCH, spacing=1)
         words.setContentsMargins(MARGIN, 6, RIGHT, 4)
@@ -241,6 +245,8 @@ class LaneCard(QFrame):
         """Back to the number of one run."""
         if self._runs is not None:
             self._runs = None
+            self._swatch.show()
+            self._title.show()
             self.setToolTip("")
             self._more.setText("")
 
@@ -268,6 +274,11 @@ class LaneCard(QFrame):
         below = self.height() >= TITLE + LINE - 3
         counted = self.lane.raster and not below  # a few figures: they fit beside
         self._beside.setText(self._counts(values) if counted else unit.strip())
+        # grey beside several runs: it gives way to their figures, then the title does
+        wide = self._title.sizeHint().width() + GAP + self._beside.sizeHint().width()
+        room = CARD - MARGIN - RIGHT
+        self._swatch.setVisible(not counted or SWATCH + GAP + wide <= room)
+        self._title.setVisible(not counted or wide <= room)
         self._more.setVisible(below)
         for places in range(self.lane.places, -1, -1):
             lines = self._lines(values, changes, places)
@@ -293,7 +304,7 @@ class LaneCard(QFrame):
     def _counts(self, values: Values) -> str:
         """Of each run, in its colour, for one line."""
         runs = zip(MARKS, self._theme.tokens.runs, values, strict=False)
-        return " &nbsp;".join(
+        return " ".join(
             f'<span style="color:{colour}">{mark}</span> <b>{self._text(value)}</b>'
             for mark, colour, value in runs
         )

@@ -190,6 +190,24 @@ def test_spikes_of_several_runs_are_counted_in_a_low_lane(app) -> None:
     card.close()
 
 
+@pytest.mark.parametrize("counts", [(3, 0, 2), (12, 0, 17), (123, 118, 130)])
+def test_counts_of_three_runs_are_whole_in_a_low_lane(lab, counts) -> None:
+    """The last figure was cut off at the edge of the card."""
+    card = LaneCard(LANES["spikes"], Theme("light"))
+    card.resize(CARD, 34)
+    card.show()
+    card.show_runs([float(one) for one in counts], None, "in view")
+    lab.app.processEvents()
+    labels = [one for one in card.findChildren(QLabel) if one.isVisible()]
+    (told,) = (one for one in labels if "▲" in one.text())
+    assert told.width() >= told.sizeHint().width(), "all of it is seen"
+    assert told.geometry().right() < card.width()
+    card.show_value(7.0)
+    seen = [c.text() for c in card.findChildren(QLabel) if c.isVisible()]
+    assert "Spikes" in seen, "one run has its title again"
+    card.close()
+
+
 def test_two_runs_are_compared_in_the_same_lanes(lab) -> None:
     window, session = lab.window, lab.session
     # the newest two: the list leaves out what other tests have run long before
