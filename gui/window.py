@@ -119,7 +119,8 @@ class Window(QMainWindow):
         if self._bench_changed():
             self.review.manual.show_bench(self.session.bench.spec)
         self.centre.show_empty(
-            snapshot.state is WindowState.DISCONNECTED and self.screen_.run is None
+            snapshot.state is WindowState.DISCONNECTED and self.screen_.run is None,
+            self.session.bench.silent,
         )
         self.centre.log.note.setPlaceholderText(self.runs.note_goes_to)
         tools = self.centre.tools
@@ -312,6 +313,7 @@ class Window(QMainWindow):
         self.banner.acknowledged.connect(session.acknowledge)
         self.banner.log_asked.connect(self.centre.show_safety)
         self.centre.empty.simulated_asked.connect(lambda: session.connect_bench("sim"))
+        self.centre.empty.again_asked.connect(session.connect_again)
         self.centre.empty.open_asked.connect(self.screen_.ask_scene)
         self.centre.empty.connect_asked.connect(self.actions_.connect_dialog)
         self.centre.empty.recent_asked.connect(self.screen_.open_run)

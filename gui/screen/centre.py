@@ -39,8 +39,15 @@ FOLLOWED = 5.0
 """Visible time of a run that begins, s."""
 
 
+EXPLORE = (
+    "Explore with the simulated bench: same drivers, same protocols, same files, no "
+    "hardware. Or connect your own coil source, oscilloscope and teslameter."
+)
+SILENT = "{} is not connected. See to what did not answer, then connect it again."
+
+
 class EmptyCard(QFrame):
-    """What to do where there is no bench: simulated, connect, open, recent.
+    """What to do where there is no bench: again or simulated, connect, open, recent.
 
     Args:
         parent: what it lies on.
@@ -49,6 +56,8 @@ class EmptyCard(QFrame):
     """
 
     simulated_asked = Signal()
+    again_asked = Signal()
+    """The bench that did not answer."""
     connect_asked = Signal()
     open_asked = Signal()
     recent_asked = Signal(object)
@@ -60,16 +69,12 @@ class EmptyCard(QFrame):
         self._below, self._above, self._theme = parent, above, theme
         self._picture = QLabel()
         title = label("No bench connected", "big")
-        self._text = text = label(
-            "Explore with the simulated bench: same drivers, same protocols, same "
-            "files, no hardware. Or connect your own coil source, oscilloscope "
-            "and teslameter.",
-            wrap=True,
-        )
+        self._text = text = label(EXPLORE, wrap=True)
+        self.again = push("Connect again", "primary")
         self.simulated = push("Use simulated bench", "primary")
         self._connect = connect = push("Connect instruments …")
         scene = push("Open scene …")
-        offers = (self.simulated, connect, scene)
+        offers = (self.again, self.simulated, connect, scene)
         buttons = row(STRETCH, *offers, STRETCH, spacing=8)
         self._listed = QWidget()
         self._recent = column(self._listed, spacing=2)
@@ -78,12 +83,21 @@ class EmptyCard(QFrame):
             words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         parts = (self._picture, title, text, buttons, self._listed, hint)
         self._rows = column(self, *parts, margin=26, spacing=12)
+        self.again.clicked.connect(self.again_asked)
         self.simulated.clicked.connect(self.simulated_asked)
         connect.clicked.connect(self.connect_asked)
         scene.clicked.connect(self.open_asked)
         theme.changed.connect(self._tint)
         self._tint()
         parent.installEventFilter(self)
+        self.offer("")
+
+    def offer(self, silent: str) -> None:
+        """Offer the bench that did not answer, "" for none, before a simulated one."""
+        self.again.setVisible(bool(silent))
+        self.again.setToolTip(silent)
+        self.simulated.setHidden(bool(silent))  # the menu has it, too
+        self._text.setText(SILENT.format(silent) if silent else EXPLORE)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Stay in the middle of what it lies on."""
@@ -272,8 +286,14 @@ class Centre(QWidget):
             self.stack.show_lanes(lanes)
             self.empty.raise_()  # the cards of new lanes lie above what was there
 
-    def show_empty(self, wanted: bool) -> None:
-        """Show or hide the card of the empty state."""
+    def show_empty(self, wanted: bool, silent: str = "") -> None:
+        """Show or hide the card of the empty state.
+
+        Args:
+            wanted: whether there is no bench, and no run on screen.
+            silent: name of the bench that did not answer; "" for none.
+        """
         self.empty.setVisible(wanted)
         if wanted:
+            self.empty.offer(silent)
             self.empty.place()

@@ -127,6 +127,12 @@ class ConnectedBench(QObject):
         """Whether the last answer still says that the instruments are there."""
         return self.age is not None and self.age < STALE
 
+    @property
+    def silent(self) -> str:
+        """Name of a real bench that was chosen and did not answer; "" for none."""
+        spec = self.spec if self.found is None else None
+        return "" if spec is None or spec.simulated else spec.name
+
     def let_go(self) -> None:
         """No bench any more."""
         self.choice = self.spec = self.found = None

@@ -124,6 +124,11 @@ class Session(QObject):
         self.bench.connect_to(choice)
         return ""
 
+    def connect_again(self) -> None:
+        """Ask the bench that did not answer."""
+        if self.bench.choice is not None:
+            self.connect_bench(self.bench.choice)
+
     def disconnect_bench(self) -> None:
         """Let go of the bench."""
         if self._free:

@@ -11,7 +11,7 @@ import pytest
 from benches import READ_BY_HAND
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QLabel, QPushButton
 
 from gui.dialogs.bench_text import (
     BY_PERSON,
@@ -308,6 +308,30 @@ def test_absent_source_is_a_fault_and_then_no_bench(lab) -> None:
     window.banner.acknowledge.click()
     assert session.state is WindowState.DISCONNECTED
     assert window.centre.empty.isVisible()
+
+
+def test_a_bench_that_did_not_answer_can_be_connected_again(lab) -> None:
+    """It was nowhere to be found: the simulated one was offered in its place."""
+    window, session = lab.window, lab.session
+    window.actions_.connect_dialog()
+    dialog = window.findChild(Connect)
+    dialog.instruments.coil_port.setCurrentText("/dev/not-there")
+    file = lab.folder / "absent.toml"
+    assert dialog.save_to(file)
+    lab.until(lambda: session.state is WindowState.FAULT)
+    window.banner.acknowledge.click()
+    card = window.centre.empty
+    offered = [b for b in card.findChildren(QPushButton) if b.isVisible()]
+    (first,) = (b for b in offered if b.property("role") == "primary")
+    assert first.text() == "Connect again"
+    first.click()
+    assert session.state is WindowState.CONNECTING
+    lab.until(lambda: session.state is WindowState.FAULT)
+    assert "not-there" in session.status.fault.consequence, "it is asked anew"
+    window.banner.acknowledge.click()
+    session.bench.let_go()
+    window.render_state()
+    assert card.simulated.isVisible() and not card.again.isVisible()
 
 
 def test_a_bench_that_cannot_be_connected_now_is_saved_and_says_so(lab) -> None:
