@@ -90,7 +90,8 @@ class ConnectedBench(QObject):
         self.choice = choice
         self.overrides, self.found = (), None
         self.request = bench_request(choice, self.spec)
-        self._status.coil.use(None)
+        if not self._status.coil.doubtful:  # else that stands until somebody answered
+            self._status.coil.use(None)
         self._log.add(
             Severity.INFO, "bench", f"Asking the instruments of {self.spec.name}"
         )

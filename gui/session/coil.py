@@ -31,6 +31,12 @@ class CoilWatch:
         self._read: float | None = NEVER
         self._under: float | None = None
 
+    @property
+    def doubtful(self) -> bool:
+        """Whether there is a coil of which nobody could verify that it is off."""
+        left = self._off
+        return self.limits is not None and (left is None or not left.verified)
+
     def use(self, limits: CoilLimits | None) -> None:
         """Another bench, or none: nothing is known of its coil yet."""
         self.limits = limits

@@ -22,7 +22,7 @@ from gui.dialogs.bench_text import (
 from gui.dialogs.connect import Connect
 from gui.dialogs.instruments import InstrumentsPage
 from gui.review.conclusion import ShownConclusion, conclusion_of
-from gui.state import FaultNotice, WindowState
+from gui.state import CoilKnowledge, FaultNotice, WindowState
 from sim_backend.serve import ServedBench
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.engine.commands import answer
@@ -332,6 +332,26 @@ def test_a_bench_that_did_not_answer_can_be_connected_again(lab) -> None:
     session.bench.let_go()
     window.render_state()
     assert card.simulated.isVisible() and not card.again.isVisible()
+
+
+def test_asking_again_makes_no_unknown_coil_known(lab) -> None:
+    """STOP said "no coil source" until there was an answer."""
+    window, session = lab.window, lab.session
+    window.actions_.connect_dialog()
+    dialog = window.findChild(Connect)
+    dialog.instruments.coil_port.setCurrentText("/dev/not-there")
+    assert dialog.save_to(lab.folder / "absent.toml")
+    lab.until(lambda: session.state is WindowState.FAULT)
+    session.acknowledge()
+    for bench in (str(lab.folder / "absent.toml"), "sim"):
+        assert window.header.stop.truth is CoilKnowledge.UNKNOWN
+        session.connect_bench(bench)
+        assert session.state is WindowState.CONNECTING
+        assert window.header.stop.truth is CoilKnowledge.UNKNOWN, "nobody has answered"
+        lab.until(lambda: session.state is not WindowState.CONNECTING)
+        session.acknowledge()
+    lab.until(lambda: session.state is WindowState.READY)
+    assert window.header.stop.truth is CoilKnowledge.OFF, "read back"
 
 
 def test_a_bench_that_cannot_be_connected_now_is_saved_and_says_so(lab) -> None:
