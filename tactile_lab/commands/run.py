@@ -123,6 +123,8 @@ def command(
                 print_run(done, report, time.monotonic() - began)
                 if changed is not None:
                     say(f"against {again}\n{changed}")
+            except BrokenPipeError:  # who read it has gone, and wanted no more
+                raise
             except OSError as full:
                 unread.append(full)
                 raise

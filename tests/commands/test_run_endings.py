@@ -93,7 +93,7 @@ def test_what_follows_a_run_is_called_where_nobody_reads_on(
     monkeypatch.setattr(Lab, "follow", lambda _, run: followed.append(run) or "")
     monkeypatch.setattr("tactile_lab.commands.run.print_run", full)
     done = tactile_lab("run", *SHORT, "--no-report", "--out", tmp_path)
-    assert done.code == 0
+    assert done.code == 1, "complete, but its answer is lost"
     assert followed == [*tmp_path.iterdir()]
     assert "the report was cut short" not in done.err
 

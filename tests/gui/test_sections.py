@@ -141,7 +141,7 @@ def test_one_undo_for_form_and_tables(lab, tables) -> None:
     lab.window.setup.form.edits.undo()
     assert tables.form("record").value("sample_rate").text == "50 kS/s"
     lab.window.setup.form.edits.undo()
-    assert tables.form("record").value("sample_rate").text == "200 kS/s"
+    assert tables.form("record").value("sample_rate").text == "500 kS/s"
 
 
 def test_what_was_typed_for_a_protocol_is_there_when_it_is_picked_again(
