@@ -189,10 +189,11 @@ class Window(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:
         """Close at once where nothing drives the coil, or would be lost; else ask."""
         session = self.session
-        lost = bool(session.queue.items or session.run.waiting)
+        snapshot = session.snapshot()
+        lost = snapshot.queued or snapshot.notes
         if (session.busy or lost) and not self._leaving:
             event.ignore()
-            self.closing.ask(session.snapshot(), busy=session.busy)
+            self.closing.ask(snapshot, busy=session.busy)
             return
         if session.occupied:
             session.show_monitor(False)

@@ -123,10 +123,10 @@ def command(
                 print_run(done, report, time.monotonic() - began)
                 if changed is not None:
                     say(f"against {again}\n{changed}")
-            except BrokenPipeError:  # who read it has gone, and wanted no more
-                raise
             except OSError as full:
-                unread.append(full)
+                # who read a pipe that broke has gone, and wanted no more
+                if not isinstance(full, BrokenPipeError):
+                    unread.append(full)
                 raise
 
         concluded(done, no_report=no_report, tell=tell)

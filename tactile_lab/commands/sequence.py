@@ -124,7 +124,6 @@ def command(
                 steps, kept_notes = _resumed(state, scenes, bench)
             else:
                 steps = _asked(scenes, bench)
-            if not resume:
                 _refuse_to_forget(state)
             _plan_all(steps)
             kept_notes |= noted(notes)

@@ -228,6 +228,15 @@ class Circuit(SceneTable):
         height = self.fire_voltage - self.reset_voltage
         return self.tau_K * math.log(height / threshold) if height > threshold else 0.0
 
+    def shows_spikes(self, threshold: float, rate: float) -> bool:
+        """Whether no spike above `threshold` V fits between two samples of V_K.
+
+        Args:
+            threshold: on V_K, V.
+            rate: of the samples, S/s.
+        """
+        return rate * self.spike_width(threshold) >= 1
+
     @property
     def reset_time(self) -> float:
         """Time of the reset t_eps, Eq. (11), s."""

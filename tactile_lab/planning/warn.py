@@ -98,8 +98,10 @@ def spike_width(scene: Scene) -> float:
 
 def misses_spikes(scene: Scene, needed: Needs) -> bool:
     """Whether a spike fits between two samples of V_K, where they are looked for."""
-    searched = needed.detect_on == "V_K"
-    return searched and 1 / scene.record.sample_rate > spike_width(scene)
+    if needed.detect_on != "V_K":
+        return False
+    rate = scene.record.sample_rate
+    return not scene.circuit.shows_spikes(threshold_of(scene), rate)
 
 
 def threshold_of(scene: Scene) -> float:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.folder import LOG, lock, write_json
+from tactile_lab.trust import INFO
 from tactile_lab.whole_file import failing_as
 
 REMARKS = "remarks.json"
@@ -103,7 +104,7 @@ def change_remarks(path: Path, change: Callable[[Remarks], Remarks]) -> Remarks:
         RunFolderError: the remarks so far are damaged.
         RecordingError: the folder cannot be written.
     """
-    with failing_as(f"{path} cannot be written"), (path / "run.json").open("r+") as run:
+    with failing_as(f"{path} cannot be written"), (path / INFO).open("r+") as run:
         lock(run, wait=True)
         before = read_remarks(path)
         after = change(before)

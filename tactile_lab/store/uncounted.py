@@ -34,5 +34,4 @@ def samples_catch_spikes(run: StoredRun) -> bool:
         circuit = run.scene.circuit
     except SceneError:
         return True
-    width = circuit.spike_width(detection["threshold_V"])
-    return bool(width * run.info["sample_rate_Hz"] >= 1)
+    return circuit.shows_spikes(detection["threshold_V"], run.info["sample_rate_Hz"])
