@@ -10,6 +10,7 @@ from PySide6.QtTest import QTest
 
 from gui.dialogs.saving import picture
 from gui.state import WindowState
+from tactile_lab.engine import jobs
 from tactile_lab.store.remarks import add_note, read_remarks
 from tactile_lab.store.run import Run
 
@@ -99,7 +100,9 @@ def test_a_note_beside_an_old_run_is_kept_with_that_run(lab) -> None:
     entries.search.clear()
 
 
-def test_a_report_is_written_again_for_what_is_noted_after_it(lab) -> None:
+def test_a_report_is_written_again_for_what_is_noted_after_it(lab, monkeypatch) -> None:
+    # at the lowest priority it waits for as long as other tests compute
+    monkeypatch.setattr(jobs, "stand_back", lambda writing: None)
     window, folder = lab.window, lab.folder / "noted"
     shutil.copytree(lab.runs(1)[0], folder)
     report = folder / "report.html"
