@@ -345,14 +345,17 @@ def test_a_long_signal_is_seen_whole_in_little_memory(
     recorder.close("complete", 1 << 22)
     with Run.load(folder.path) as run:
         taken = []
-        for bins in (64, 64, 1 << 20):  # what is loaded first stays
+        # what is loaded first stays; a dict of h5py's for all files may grow once
+        for bins in (64, 64, 64, 1 << 20, 1 << 20):
             monkeypatch.setattr("tactile_lab.store.signal.AT_ONCE", bins)
             signal = run.signal("V_K")
             tracemalloc.start()
             signal.trace(cells=50)
             taken.append(tracemalloc.get_traced_memory())
             tracemalloc.stop()
-    (_, (kept, most), (whole_kept, whole)) = taken
+    _, *parts, one, other = taken
+    kept, most = map(min, zip(*parts, strict=True))
+    whole_kept, whole = map(min, zip(one, other, strict=True))
     assert most < 0.5 * whole
     assert kept < 0.5 * whole_kept
 
