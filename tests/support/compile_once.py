@@ -3,8 +3,8 @@
     python tests/support/compile_once.py
 
 Each worker of the tests would compile for itself what no other has kept yet, and each
-would rewrite the assertions of every test. One core does this while another checks the
-types.
+would rewrite the assertions of every test. This is done while another process checks
+the types, and in two: those are done long before one would have compiled all.
 """
 
 import os
@@ -38,31 +38,45 @@ keep = ["spike_count"]
 key = "protocol.level"
 values = ["80 mN", "160 mN"]
 """
-COMMANDS = (
-    ("run", "demo", "--set", "protocol.hold=0.2 s"),
-    ("simulate", "--set", "sensor.saturation=true"),
-    ("skin", "plain.toml"),
-    ("skin", "saturated.toml"),
-    ("study", "sweep.toml"),
-    ("validate", "stability", "--case", "R_k", "--cap", "0.01"),
-)
+COMMANDS = {
+    "plain": (
+        ("run", "demo", "--set", "protocol.hold=0.2 s"),
+        ("skin", "plain.toml"),
+        ("study", "sweep.toml"),
+    ),
+    "saturated": (
+        ("simulate", "--set", "sensor.saturation=true"),
+        ("skin", "saturated.toml"),
+        ("validate", "stability", "--case", "R_k", "--cap", "0.01"),
+    ),
+}
+"""By the equations they solve, which are compiled apart."""
 
 
-def main() -> None:
-    """Collect all tests; run one command after another in a folder then removed."""
-    collect = [sys.executable, "-m", "pytest", "--collect-only", "-qq"]
-    # what cannot be collected is told by the tests' own run
-    subprocess.run(collect, cwd=ROOT, check=False, stdout=subprocess.DEVNULL)
+def compile_all(equations: str) -> None:
+    """Run one command after another in a folder then removed."""
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         Path("plain.toml").write_text(SKIN.format(saturation=""))
         Path("saturated.toml").write_text(SKIN.format(saturation="saturation = true"))
         Path("sweep.toml").write_text(STUDY)
-        for command in COMMANDS:
+        for command in COMMANDS[equations]:
             cli.main(command, standalone_mode=False)
-        simulate_taxel(load_skin("plain.toml"), 0)
+        simulate_taxel(load_skin(f"{equations}.toml"), 0)
         os.chdir("/")
 
 
+def main() -> None:
+    """Have all compiled side by side, and collect all tests meanwhile."""
+    begun = [
+        subprocess.Popen([sys.executable, __file__, equations])
+        for equations in COMMANDS
+    ]
+    collect = [sys.executable, "-m", "pytest", "--collect-only", "-qq"]
+    # what cannot be collected is told by the tests' own run
+    subprocess.run(collect, cwd=ROOT, check=False, stdout=subprocess.DEVNULL)
+    sys.exit(any([one.wait() for one in begun]))
+
+
 if __name__ == "__main__":
-    main()
+    compile_all(sys.argv[1]) if sys.argv[1:] else main()
