@@ -96,8 +96,8 @@ def main(
     with collected_here():
         app.exec()
         session.close()
-    left = session.coil_view()
-    return 4 if left is not None and left.verified_off is False else 0
+    left, unknown = session.coil_view(), session.status.coil.left_unknown
+    return 4 if unknown or (left is not None and left.verified_off is False) else 0
 
 
 def show_skin(path: Path, out: Path, theme: str) -> None:

@@ -1,4 +1,4 @@
-"""The fault's banner: what, when, consequence, and what to do next."""
+"""The banner of a fault or an unknown coil: what, consequence, what to do next."""
 
 from __future__ import annotations
 
@@ -8,17 +8,19 @@ from PySide6.QtWidgets import QFrame, QLabel
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import bar, label, lines, push
-from gui.state import FaultNotice
+from gui.state import FaultNotice, Snapshot, left_notice
 
 
 class Banner(QFrame):
-    """Shown from the fault until it is acknowledged.
+    """Shown from the fault until it is acknowledged, then for what was left unknown.
 
     Attributes:
         met: whether a key has led to it since this fault.
     """
 
     acknowledged = Signal()
+    switched_off = Signal()
+    """A person has switched off what was left unknown."""
     log_asked = Signal()
 
     def __init__(self, theme: Theme) -> None:
@@ -33,14 +35,21 @@ class Banner(QFrame):
         words = lines(self._title, self._text, spacing=2)
         self.show_log = push("Show in log")
         self.acknowledge = push("Acknowledge and reset", "primary")
-        parts = (self._sign, (words, 1), self.show_log, self.acknowledge)
+        self.is_off = push("It is switched off")
+        # what a second click on Acknowledge may meet says nothing of a coil
+        buttons = (self.is_off, self.show_log, self.acknowledge)
+        parts = (self._sign, (words, 1), *buttons)
         bar(self, (16, 9, 12, 9), 12, *parts)
         self.show_log.clicked.connect(self.log_asked)
         self.acknowledge.clicked.connect(self.acknowledged)
+        self.is_off.clicked.connect(self.switched_off)
         self.hide()
 
-    def show_fault(self, fault: FaultNotice | None) -> None:
-        """Show a fault, or hide."""
+    def render_snapshot(self, snapshot: Snapshot) -> None:
+        """Show the fault, else which coils were left unknown, or hide."""
+        fault = snapshot.fault or left_notice(snapshot.left_unknown)
+        self.acknowledge.setVisible(snapshot.fault is not None)
+        self.is_off.setVisible(snapshot.fault is None)
         self.met = self.met and fault == self._fault
         self._fault = fault
         self.setVisible(fault is not None)

@@ -139,6 +139,7 @@ class Snapshot:
         title: of the run or whatever else is on screen; "" before any.
         opened: how many runs from disk are on screen.
         coil: what is known about the coil; None without a coil source.
+        left_unknown: ports of coils of other benches that nobody could verify off.
         instruments: chips, in order; only those the scene uses.
         elapsed: run time reached, s.
         expected: run time expected, s; None if unknown.
@@ -155,6 +156,7 @@ class Snapshot:
     title: str = ""
     opened: int = 0
     coil: CoilView | None = None
+    left_unknown: tuple[str, ...] = ()
     instruments: tuple[InstrumentView, ...] = field(default=())
     elapsed: float = 0.0
     expected: float | None = None
@@ -191,6 +193,26 @@ def truth(state: WindowState, coil: CoilView | None) -> CoilKnowledge:
     )
 
 
+def stop_truth(
+    state: WindowState, coil: CoilView | None, left_unknown: tuple[str, ...]
+) -> CoilKnowledge:
+    """What STOP claims: where the coil is at rest, of those that were left unknown."""
+    what = truth(state, coil)
+    at_rest = what in (CoilKnowledge.NONE, CoilKnowledge.OFF)
+    return CoilKnowledge.UNKNOWN if left_unknown and at_rest else what
+
+
+def left_notice(left_unknown: tuple[str, ...]) -> FaultNotice | None:
+    """What is to be read of coils that were left unknown; None where none was."""
+    if not left_unknown:
+        return None
+    return FaultNotice(
+        f"Coil state unknown at {' and '.join(left_unknown)}.",
+        "It may still be driven, and this bench cannot switch it off. Switch it off at "
+        "the source, or connect its bench again.",
+    )
+
+
 @dataclass(frozen=True)
 class StopText:
     """The two lines on STOP, and the whole as one sentence for screen readers."""
@@ -212,14 +234,16 @@ def milliamperes(current: float | None) -> str:
     return printed(f"{number} mA")
 
 
-def stop_text(state: WindowState, coil: CoilView | None) -> StopText:
+def stop_text(
+    state: WindowState, coil: CoilView | None, left_unknown: tuple[str, ...] = ()
+) -> StopText:
     """What STOP says, from the read-back."""
-    what = truth(state, coil)
+    what = stop_truth(state, coil, left_unknown)
+    if what is CoilKnowledge.UNKNOWN:
+        return StopText("COIL STATE UNKNOWN", "switch off at the source")
     if what is CoilKnowledge.NONE or coil is None:
         return StopText("STOP", "no coil source")
     now = milliamperes(coil.current)
-    if what is CoilKnowledge.UNKNOWN:
-        return StopText("COIL STATE UNKNOWN", "switch off at the source")
     if what is CoilKnowledge.FALLING:
         return StopText("STOPPING", f"{now} → 0")
     if what is CoilKnowledge.LIVE:

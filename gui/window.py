@@ -113,7 +113,7 @@ class Window(QMainWindow):
         self.header.render_snapshot(snapshot)
         named = dict.fromkeys((snapshot.heading, snapshot.bench, "Tactile Lab"))
         self.setWindowTitle(" · ".join(name for name in named if name))
-        self.banner.show_fault(snapshot.fault)
+        self.banner.render_snapshot(snapshot)
         self.setup.render_snapshot(snapshot)
         self._render_manual(snapshot)
         if self._bench_changed():
@@ -312,6 +312,7 @@ class Window(QMainWindow):
         session.run.reported.connect(self.screen_.reported)
         self.header.stop.clicked.connect(lambda: session.stop())
         self.banner.acknowledged.connect(session.acknowledge)
+        self.banner.switched_off.connect(session.take_as_off)
         self.banner.log_asked.connect(self.centre.show_safety)
         self.centre.empty.simulated_asked.connect(lambda: session.connect_bench("sim"))
         self.centre.empty.again_asked.connect(session.connect_again)

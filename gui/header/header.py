@@ -174,7 +174,7 @@ class Header(QFrame):
         if self._clock.text() != clock:
             self._clock.setText(clock)
         self._state.setAccessibleName(f"{word}, {clock}")
-        self.stop.show_coil(snapshot.state, snapshot.coil)
+        self.stop.show_coil(snapshot.state, snapshot.coil, snapshot.left_unknown)
 
     def _lay_out(self) -> None:
         self._logo = QLabel()

@@ -17,7 +17,14 @@ from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
 from gui.look import tokens as look
 from gui.look.fonts import sized
-from gui.state import CoilKnowledge, CoilView, StopText, WindowState, stop_text, truth
+from gui.state import (
+    CoilKnowledge,
+    CoilView,
+    StopText,
+    WindowState,
+    stop_text,
+    stop_truth,
+)
 
 WIDTH, HEIGHT = 228, 52
 
@@ -48,9 +55,15 @@ class StopButton(QAbstractButton):
         """The two lines shown."""
         return self._words
 
-    def show_coil(self, state: WindowState, coil: CoilView | None) -> None:
-        """Render from the coil as read back."""
-        shown = truth(state, coil), state is WindowState.FAULT, stop_text(state, coil)
+    def show_coil(
+        self,
+        state: WindowState,
+        coil: CoilView | None,
+        left_unknown: tuple[str, ...] = (),
+    ) -> None:
+        """Render from the coil as read back, and those that were left unknown."""
+        known = state, coil, left_unknown
+        shown = stop_truth(*known), state is WindowState.FAULT, stop_text(*known)
         if shown != (self._truth, self._fault, self._words):
             self._truth, self._fault, self._words = shown
             self.setText(self._words.spoken)

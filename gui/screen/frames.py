@@ -72,7 +72,8 @@ class FrameLoop(QObject):
         panels, session = self._panels, self._panels.session
         told = session.poll()
         for stop in panels.stops:
-            stop.show_coil(session.state, session.coil_view())
+            left = session.status.coil.left_unknown
+            stop.show_coil(session.state, session.coil_view(), left)
         now = time.monotonic()
         source, seen = self._screen.live, not panels.centre.lanes.window().isMinimized()
         if source is not None and told and seen and not self.frozen:

@@ -226,8 +226,10 @@ class ConnectedBench(QObject):
             return
         broken = [one for one in found.found if one.problem]
         coil = self.spec.coil if self.spec is not None else None
-        has_coil = coil is not None and any(one.role == "coil" for one in found.found)
-        status.coil.use(coil.limits if has_coil and coil is not None else None)
+        if coil is not None and any(one.role == "coil" for one in found.found):
+            status.coil.use(coil.limits, coil.port)
+        else:
+            status.coil.use(None)
         self._take(found)
         for one in found.found:
             if one.problem:

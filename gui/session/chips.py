@@ -39,7 +39,10 @@ class Chips:
         self, plan: Expectation | None, coil: CoilView | None
     ) -> tuple[InstrumentView, ...]:
         """Chips of the instruments the plan on screen needs, the model last."""
-        views = []
+        views = [
+            InstrumentView("Coil left", Lamp.BAD, f"{port}: state unknown", "?")
+            for port in self._status.coil.left_unknown
+        ]
         for role in self._roles(plan):
             if role == "coil":
                 views.append(self._coil(coil))

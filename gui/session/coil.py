@@ -21,10 +21,14 @@ class CoilWatch:
 
     Attributes:
         limits: in force; None without a coil.
+        left_unknown: ports of other coils, which may still be driven: nobody could
+            verify them off before another bench was connected.
     """
 
     def __init__(self) -> None:
         self.limits: CoilLimits | None = None
+        self.left_unknown: tuple[str, ...] = ()
+        self._port = ""
         self._off: OffReport | None = None
         self._since = time.monotonic()
         self._sign = time.monotonic()
@@ -37,9 +41,16 @@ class CoilWatch:
         left = self._off
         return self.limits is not None and (left is None or not left.verified)
 
-    def use(self, limits: CoilLimits | None) -> None:
-        """Another bench, or none: nothing is known of its coil yet."""
-        self.limits = limits
+    def use(self, limits: CoilLimits | None, port: str = "") -> None:
+        """Another bench, or none: nothing is known of its coil yet.
+
+        Args:
+            limits: of its coil; None without one.
+            port: where that is; "" without one.
+        """
+        left = {*self.left_unknown, *([self._port] if self.doubtful else [])}
+        self.left_unknown = tuple(sorted(left - {port}))
+        self.limits, self._port = limits, port
         self._off = None
 
     def left(self, off: OffReport | None) -> None:

@@ -269,6 +269,15 @@ class Session(QObject):
             else:
                 self.status.enter(WindowState.DISCONNECTED)
 
+    def take_as_off(self) -> None:
+        """A person has seen to the coils of other benches that were left unknown."""
+        coil = self.status.coil
+        left, coil.left_unknown = coil.left_unknown, ()
+        if left:
+            words = f"The coil at {' and '.join(left)} is off, a person says"
+            self.log.add(Severity.WARNING, "safety", words, safety=True)
+            self.status.changed.emit()
+
     # --- what the window shows
 
     @property
@@ -316,6 +325,7 @@ class Session(QObject):
             title=self.name if seen else "",
             opened=len(self.opened) if seen else 0,
             coil=coil,
+            left_unknown=self.status.coil.left_unknown,
             instruments=self._chips.views(self.plan_on_screen, coil),
             elapsed=self.run.elapsed,
             expected=self.run.expected,

@@ -223,10 +223,13 @@ def test_its_chip_tells_who_it_is_and_what_it_reads(serial):
     from gui.session.chips import Chips
     from gui.session.expectation import expect
     from gui.session.heard import Heard
+    from gui.session.log import Log
+    from gui.session.status import Status
     from gui.state import Lamp, WindowState
 
     answers = (InstrumentAnswer("thermometer", "LSCI,MODEL335,12/0,1.0", ""),)
-    status = SimpleNamespace(state=WindowState.READY)
+    status = Status(Log())
+    status.state = WindowState.READY
     bench = SimpleNamespace(answers=answers, age=0.0, known=True, field=None)
     answered = {"thermometer": Heard()}
     run = SimpleNamespace(voltages={}, kelvin=None, agreement=None, answered=answered)

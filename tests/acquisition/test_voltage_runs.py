@@ -163,9 +163,12 @@ def test_the_chip_of_a_source_tells_what_it_is_to_hold_and_what_it_holds(scene):
     from gui.session.chips import Chips
     from gui.session.expectation import expect
     from gui.session.heard import Heard
+    from gui.session.log import Log
+    from gui.session.status import Status
     from gui.state import Lamp, WindowState
 
-    status = SimpleNamespace(state=WindowState.READY)
+    status = Status(Log())
+    status.state = WindowState.READY
     answers = (InstrumentAnswer("V_GS", "KEITHLEY", ""),)
     bench = SimpleNamespace(answers=answers, age=0.0, known=True, field=None)
     answered = {"V_GS": Heard()}

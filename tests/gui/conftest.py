@@ -92,6 +92,7 @@ class Lab:
         self.until(lambda: not session.busy and not session.monitor.alive)
         self.until(lambda: session.link.idle)
         session.acknowledge()
+        session.take_as_off()
         if session.state is WindowState.DISCONNECTED:
             session.connect_bench("sim")
         self.until(lambda: session.state is WindowState.READY)

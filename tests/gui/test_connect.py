@@ -351,6 +351,8 @@ def test_asking_again_makes_no_unknown_coil_known(lab) -> None:
         lab.until(lambda: session.state is not WindowState.CONNECTING)
         session.acknowledge()
     lab.until(lambda: session.state is WindowState.READY)
+    assert window.header.stop.truth is CoilKnowledge.UNKNOWN, "of the bench before"
+    window.banner.is_off.click()
     assert window.header.stop.truth is CoilKnowledge.OFF, "read back"
 
 
