@@ -57,6 +57,7 @@ class Comparison(Source):
         self.signals = tuple(common)
         self.first = members[0].source
         self.holds, self.spikes = self.first.holds, self.first.spikes
+        self.counted = self.first.counted
         self.simulated = any(member.source.simulated for member in members)
 
     @property

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gui.lanes.expected import starts
 from gui.lanes.lane import Lane
 from gui.lanes.source import Source
 from gui.plots.numbers import number
 from tactile_lab.arrays import FloatArray
-from tactile_lab.spikes.rate import LEAST_SILENCE, NEVER, SILENCE, begins, rate_at
+from tactile_lab.spikes.rate import LEAST_SILENCE, NEVER, SILENCE, begins
 from tactile_lab.trace import Trace
 
 NEAR = 0.02
@@ -35,7 +34,7 @@ def newest(lane: Lane, source: Source) -> float | None:
         spikes = source.spikes
         # spikes may be told before the samples they were found in
         now = max(reach, float(spikes[-1])) if spikes.size else reach
-        return rate_at(spikes, now, starts(source.holds))
+        return source.rate(now)
     if lane.symmetric:
         reach = min(reach, source.followed)
     (shown,) = source.shown(lane, reach - 0.05, reach, 50)
@@ -84,7 +83,7 @@ def values_at(
         if run.reach <= 0 or not 0 <= own <= run.reach:
             values.append(None)
         elif lane.key == "rate":
-            values.append(rate_at(run.spikes, own, starts(run.holds)))
+            values.append(run.rate(own))
         else:
             # a record may end some of its picture's columns before its run
             value = trace.at(time)

@@ -29,6 +29,10 @@ ROOM = 96
 """Height of a card from which on there is room for statistics, px."""
 
 
+NOT_ALL = "not all are seen"
+"""Of spikes that fall between two samples: they have no rate, and no intervals."""
+
+
 class LaneRow:
     """One lane: its card with the line below it, and its plot in the scene.
 
@@ -63,7 +67,8 @@ class LaneRow:
         else:
             known = None if source.running else self._values(source, edge)[0]
             card.show_value(newest(lane, source) if source.running else known)
-            card.show_more(self._at_cursors(source))
+            untold = lane.key == "rate" and not source.counted
+            card.show_more(NOT_ALL if untold else self._at_cursors(source))
 
     def _show_spikes(self, source: Source, edge: float) -> None:
         spikes, steps, view = source.spikes, starts(source.holds), self._stage.view
@@ -74,6 +79,8 @@ class LaneRow:
             words = view_text(spikes, view.start, edge, steps)
             seen = count_between(spikes, view.start, edge)
             self.card.show_value(float(seen), "in view")
+        if not source.counted:
+            words = NOT_ALL
         if view.cursors is not None:
             words = f"{count_between(spikes, *sorted(view.cursors))} between A and B"
         self.card.show_more(words)

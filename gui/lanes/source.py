@@ -16,6 +16,7 @@ from gui.lanes.expected import Preview, Stretch, starts
 from gui.lanes.lane import Lane
 from gui.lanes.rate import rate_of
 from tactile_lab.arrays import FloatArray
+from tactile_lab.spikes.rate import rate_at
 from tactile_lab.trace import Trace
 
 if TYPE_CHECKING:
@@ -30,11 +31,13 @@ class Source:
     Attributes:
         signals: what has a lane, force and spikes included.
         simulated: whether any of it is computed physics.
+        counted: whether all its spikes are seen: else no rate of them is told.
         path: folder of a run on disk.
     """
 
     signals: Sequence[str] = ()
     simulated = False
+    counted = True
     path: Path | None = None
 
     @property
@@ -133,10 +136,15 @@ class Source:
 
     # --- what lanes show
 
+    def rate(self, time: float) -> float | None:
+        """Rate at a time, s, in Hz; None where it cannot be told."""
+        return rate_at(self.spikes, time, starts(self.holds)) if self.counted else None
+
     def trace(self, key: str, start: float, end: float, count: int) -> Trace:
         """What a lane shows of the run: a signal, its residual, the rate."""
         if key == "rate":
-            return rate_of(self.spikes, start, end, count, starts(self.holds))
+            seen = self.spikes if self.counted else NONE
+            return rate_of(seen, start, end, count, starts(self.holds))
         if key != "residual":
             return self.measured(key, start, end, count)
         # ahead of the twin is the plan: measured less that is no error of the model

@@ -23,7 +23,7 @@ from tactile_lab.store.run import Run
 from tactile_lab.store.signal import StoredSignal
 from tactile_lab.store.spike_shapes import threshold_of
 from tactile_lab.store.stored_run import Records
-from tactile_lab.store.uncounted import uncounted
+from tactile_lab.store.uncounted import samples_catch_spikes, uncounted
 from tactile_lab.trace import Trace
 
 FINER = 2
@@ -67,6 +67,7 @@ class RunSource(Source):
         self.holds = [_hold(trial) for trial in self.trials]
         self.onsets = _onsets(run, self.trials)
         self.uncounted = uncounted(run)
+        self.counted = samples_catch_spikes(run)
         self.simulated = run.simulated
         self.moves_probes, self.sets_voltages = _moves(run)
         self._threshold = threshold_of(run)

@@ -209,7 +209,8 @@ class Tools(QWidget):
         count = int(np.diff(np.searchsorted(spikes, [low, high]))[0])
         span = high - low
         whose = f"{MARKS[0]} " if len(self._stack.source.members) > 1 else ""
-        rate = f" · {whose}<b>{count / span:.3g} Hz</b>" if span > 0 else ""
+        told = span > 0 and self._stack.source.counted
+        rate = f" · {whose}<b>{count / span:.3g} Hz</b>" if told else ""
         boxes = [
             f'<span style="background:{colour};color:{tokens.on_accent};'
             f'font-weight:700">&nbsp;{name}&nbsp;</span> <b>{time:.{places}f} s</b>'

@@ -10,6 +10,7 @@ from gui.lanes.lane import title_of
 from gui.parts import STRETCH, bar, column, filled, label, push, set_role
 from gui.plots.numbers import number
 from tactile_lab.engine.sensor import SensorState
+from tactile_lab.measurement import BETWEEN_SAMPLES
 
 WIDE = 760
 """Width from which on there is room for all of it, px."""
@@ -27,6 +28,7 @@ class MonitorBar(QFrame):
         whole = bar(self, (14, 5, 10, 5), 20)
         self._values: dict[str, QLabel] = {}
         boxes: list[QWidget] = []
+        titles: list[QLabel] = []
         for name in ("V_C1", "V_C2", "Rate", "To the threshold"):
             box, shown = QFrame(), title_of(name)
             value, title = label("—", "value"), label(shown, "small")
@@ -35,7 +37,8 @@ class MonitorBar(QFrame):
             self._values[name] = value
             whole.addWidget(box)
             boxes.append(box)
-        self._threshold = title
+            titles.append(title)
+        *_, self._rate, self._threshold = titles
         self._threshold.setMinimumWidth(132)
         self.side = label("", "pill")
         self.side.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
@@ -67,13 +70,15 @@ class MonitorBar(QFrame):
         for name, text in (
             ("V_C1", _volts(now.V_C1)),
             ("V_C2", _volts(now.V_C2)),
-            ("Rate", f"{number(now.rate, 2)} Hz"),
+            ("Rate", f"{number(now.rate, 2)} Hz" if now.counted else "—"),
             (
                 "To the threshold",
                 "—" if distance is None else f"{number(1e3 * abs(distance), 0)} mV",
             ),
         ):
             self._values[name].setText(text)
+        self._rate.setText("Rate" if now.counted else "Rate: spikes missed")
+        self._rate.setToolTip("" if now.counted else BETWEEN_SAMPLES)
         critical = f" {now.critical_V_C1:.3f} V"
         if distance is None:
             self.side.setText("opening the oscilloscope …")

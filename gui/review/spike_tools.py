@@ -175,7 +175,8 @@ class SpikeTools(QObject):
                 said += f"\nafter {show(isi, 's', 4)} of silence"
             else:
                 said += f"\n{show(isi, 's', 4)} after the one before"
-                said += f" ({number(1 / isi, 2)} Hz)"
+                if self._source.counted:
+                    said += f" ({number(1 / isi, 2)} Hz)"
         if shapes is not None:
             near = int(np.argmin(np.abs(shapes.times - chosen)))
             peak, width = shapes.peaks[near], shapes.widths[near]

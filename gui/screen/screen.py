@@ -23,6 +23,7 @@ from gui.state import WindowState
 from tactile_lab.engine.memory import trim
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import RunFolderError, TactileLabError
+from tactile_lab.measurement import BETWEEN_SAMPLES
 from tactile_lab.quantity import looked_for, show
 from tactile_lab.signals import AVERAGED
 from tactile_lab.store.catalogue import Catalogue
@@ -244,7 +245,7 @@ class Screen(QObject):
             holds = expectation.preview.holds if expectation else []
             steps = sum(not hold.pause for hold in holds)
             searched = expectation is None or expectation.needs.detect_on is not None
-            why_not = expectation.uncounted if expectation else ""
+            why_not = "" if source.counted else BETWEEN_SAMPLES
             self.results.begin(steps, fires=searched, uncounted=why_not)
             if session.run.folder is not None:
                 self._panels.review.runs.show_current(session.run.folder)

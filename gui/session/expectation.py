@@ -35,7 +35,6 @@ class Expectation:
         preview: what the model expects.
         warnings: where the run would not be what is asked for.
         assumptions: what its numbers rest on.
-        uncounted: why its spikes will not all be counted; "" where they will.
     """
 
     record: Record
@@ -44,7 +43,6 @@ class Expectation:
     preview: Preview
     warnings: tuple[str, ...]
     assumptions: tuple[str, ...]
-    uncounted: str
 
 
 def plan_request(engine: Engine, request: Request) -> Expectation:
@@ -58,9 +56,7 @@ def expect(scene: Scene) -> Expectation:
     Raises:
         SceneError, LimitError: the scene cannot be run on its bench.
     """
-    from tactile_lab.measurement import BETWEEN_SAMPLES
     from tactile_lab.planning.plan import plan
-    from tactile_lab.planning.warn import misses_spikes
 
     made = plan(scene)
     return Expectation(
@@ -70,7 +66,6 @@ def expect(scene: Scene) -> Expectation:
         preview=_preview(made),
         warnings=made.warnings,
         assumptions=made.assumptions,
-        uncounted=BETWEEN_SAMPLES if misses_spikes(scene, made.needs) else "",
     )
 
 

@@ -64,6 +64,7 @@ class LiveMonitor(LiveTask):
             self._critical = event.critical_V_C1
             self.source = LiveSource(None, event.newtons_per_ampere)
             self.source.simulated = event.simulated
+            self.source.counted = event.counted
             self.begun.emit(self.source)
         elif source is not None and isinstance(event, Samples):
             source.add_bins(event.bins)
@@ -93,7 +94,8 @@ class LiveMonitor(LiveTask):
         if spikes.size > 1 and source.reach - spikes[-1] < SILENT:
             rate = 1 / max(float(spikes[-1] - spikes[-2]), 1e-9)
         V_C1, V_C2 = source.mean("V_C1"), source.mean("V_C2")
-        return SensorState(self._critical, V_C1, V_C2, rate, min(source.reach, KEPT))
+        held = min(source.reach, KEPT)
+        return SensorState(self._critical, V_C1, V_C2, rate, held, source.counted)
 
     def _recorded(self, reply: Reply[Path]) -> None:
         self.recording = False

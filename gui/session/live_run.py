@@ -327,7 +327,7 @@ class LiveRun(LiveTask):
         coil.sign_of_life()
         preview = plan.preview if plan else None
         self.source = LiveSource(preview, event.newtons_per_ampere, event.folder)
-        self.source.simulated = event.simulated
+        self.source.simulated, self.source.counted = event.simulated, event.counted
         for warning in plan.warnings if plan else ():
             self._log.add(Severity.WARNING, "plan", warning)
         self.begun.emit(self.source)

@@ -46,11 +46,13 @@ class Narrator:
         self._trial = ""
         self._spikes = 0
         self._rate = 0.0
+        self._counted = True
         self._model: ModelComparison | None = None
 
     def expect(self, execution: Execution) -> None:
         """This is about to run; the model will run beside it."""
         self._progress = ProgressLine(execution.plan.estimate.duration, self._label)
+        self._counted = execution.counted
         searched = execution.needs.detect_on is not None
         stored = "V_C1" in execution.needs.stored
         if execution.scene.compared and (searched or stored):
@@ -86,10 +88,11 @@ class Narrator:
                 progress.note(text)
 
     def _now(self) -> str:
-        """The trial, and the spikes so far with the last interval's rate."""
+        """The trial, the spikes so far and, where none is missed, the last rate."""
         if not self._spikes:
             return self._trial
-        told = f"{self._spikes} spikes, last at {self._rate:.3g} Hz"
+        last = f", last at {self._rate:.3g} Hz" if self._counted else " seen, not all"
+        told = f"{self._spikes} spikes{last}"
         return f"{self._trial}  {told}".strip()
 
     def close(self) -> None:

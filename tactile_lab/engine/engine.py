@@ -321,6 +321,7 @@ class ServedTask:
                 newtons_per_ampere=magnet.newtons_per_ampere,
                 critical_V_C1=task.scene.circuit.critical_V_C1,
                 simulated=task.scene.bench.simulated,
+                counted=task.counted,
             )
         )
         return self._run(task)

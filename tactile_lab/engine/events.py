@@ -25,6 +25,7 @@ class Begun:
         newtons_per_ampere: turns coil current into force.
         critical_V_C1: the sensor fires below it, V.
         simulated: whether its bench is.
+        counted: whether all spikes are seen: none falls between two samples.
     """
 
     folder: Path | None
@@ -32,6 +33,7 @@ class Begun:
     newtons_per_ampere: float
     critical_V_C1: float
     simulated: bool
+    counted: bool = True
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,6 +34,7 @@ from tactile_lab.engine.task import Task
 from tactile_lab.errors import SceneError, TactileLabError
 from tactile_lab.planning.calibrated import check_coil
 from tactile_lab.planning.plan import plan
+from tactile_lab.planning.warn import misses_spikes
 from tactile_lab.planning.way import drive_for
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scope import Stream
@@ -97,6 +98,7 @@ class Execution(Task[Executed]):
         self.needs = self.plan.needs
         used = bench or open_bench(scene, self.needs, realtime=realtime)
         super().__init__(scene, used, emit)
+        self.counted = not misses_spikes(scene, self.needs)
         self._others = others
         self._ask = ask
         self._asked_field = asked_field

@@ -92,7 +92,7 @@ class Monitor(Task[Ending]):
         super().__init__(scene, used, emit)
         self._ring = Ring(keep)
         self._search = SpikeSearch.of(scene, needed.detect_on)
-        self._counted = not misses_spikes(scene, needed)
+        self.counted = not misses_spikes(scene, needed)
         self._last = (float("-inf"), 0.0)
         self._recording = threading.Lock()
         self._runner = Runner(
@@ -135,7 +135,7 @@ class Monitor(Task[Ending]):
             levels.get("V_C2"),
             rate if reach - when < SILENT else 0.0,
             min(reach, self._ring.length),
-            self._counted,
+            self.counted,
         )
 
     def record(self, out: Path | str, notes: Mapping[str, str] | None = None) -> Path:

@@ -30,7 +30,10 @@ class Task(ABC, Generic[Ended]):
     Attributes:
         stop: asks for the end; a second time without ramp.
         live: the newest samples, decimated.
+        counted: whether all spikes are seen: none falls between two samples.
     """
+
+    counted = True
 
     def __init__(self, scene: Scene, bench: Bench, emit: events.Emit) -> None:
         self.scene, self.bench = scene, bench

@@ -1,0 +1,56 @@
+"""No rate is told where spikes fall between two samples of V_K, as in the report."""
+
+from tactile_lab.engine.request import Request
+from tactile_lab.measurement import BETWEEN_SAMPLES
+
+
+def told(lab, key: str) -> tuple[str, str]:
+    """What the card of a lane says: its value, and what stands below."""
+    row = lab.window.centre.stack.row(key)
+    assert row is not None
+    return row.card.text, row.card.more
+
+
+def test_the_monitor_tells_no_rate_of_spikes_that_are_not_all_seen(
+    lab, monkeypatch
+) -> None:
+    window, session = lab.window, lab.session
+    bar = window.centre.monitor_bar
+    monkeypatch.setattr(session.bench, "overrides", ('record.sample_rate="200 kS/s"',))
+    session.show_monitor(True)
+    lab.until(lambda: session.monitor.sensor.V_C1 is not None)
+    assert not session.monitor.sensor.counted, "as tactile-lab monitor says"
+    lab.until(lambda: "Rate —" in bar.words and "V_C1 4" in bar.words)
+    session.show_monitor(False)
+    lab.until(lambda: not session.monitor.alive)
+
+
+def test_a_run_tells_no_rate_of_spikes_that_are_not_all_seen(lab) -> None:
+    window, session = lab.window, lab.session
+    slow = ('record.sample_rate="200 kS/s"', 'protocol.levels=["200 mN"]')
+    session.start(Request(str(lab.folder / "short.toml"), slow, "sim"), "Slow")
+    lab.until(lambda: not session.busy)
+    assert session.source.spikes.size > 1
+    window.centre.stack.show_values()
+    assert told(lab, "rate") == ("—", "not all are seen")
+    assert told(lab, "spikes")[1] == "not all are seen"
+    source = session.source
+    assert source.trace("rate", 0.0, source.reach, 100).empty
+    assert source.rate(source.reach) is None
+    assert window.screen_.results.steps[0].uncounted == BETWEEN_SAMPLES
+    folder = session.run.folder
+    lab.until(lambda: getattr(window.screen_.run, "path", None) == folder)
+    window.centre.view.place_cursors(0.5, 1.5)
+    stored = window.screen_.run
+    assert stored.trace("rate", 0.0, stored.reach, 100).empty
+    assert told(lab, "rate")[0] == "—"
+    assert "Hz" not in window.centre.tools.readout.toolTip()
+    window.centre.view.clear_cursors()
+    assert told(lab, "rate") == ("—", "not all are seen")
+
+
+def test_a_run_that_sees_all_spikes_tells_their_rate(lab) -> None:
+    folder, window = lab.complete_run(), lab.window
+    lab.until(lambda: getattr(window.screen_.run, "path", None) == folder)
+    assert not window.screen_.run.trace("rate", 0.0, 5.0, 100).empty
+    assert told(lab, "rate")[0] != "—" and told(lab, "rate")[1] == ""
