@@ -24,6 +24,9 @@ ENDS = {
 """Colour of a run that is over, by the first word of how it ended."""
 
 
+STOPPING = "Stopping: the coil goes to 0 A and is read back"
+
+
 class Blocks(QWidget):
     """One block per step; done ones are filled. A click shows one in the lanes."""
 
@@ -107,6 +110,7 @@ class ProgressStrip(QWidget):
         super().__init__()
         self._left = Elided("No run")
         self._right = label("", "muted")
+        self._begins = False
         self.blocks = Blocks(theme)
         column(self, row((self._left, 1), self._right), self.blocks)
 
@@ -127,7 +131,7 @@ class ProgressStrip(QWidget):
         kept: bool = True,
     ) -> None:
         """Show where the run is, or how the last one ended; `kept`: it is on disk."""
-        state = snapshot.state
+        state, self._begins = snapshot.state, False
         colour = {WindowState.FAULT: "red", WindowState.ABORTING: "amber"}.get(
             state, "accent"
         )
@@ -143,6 +147,20 @@ class ProgressStrip(QWidget):
         self.blocks.show_steps(list(holds), length, reach, colour)
         self.setAccessibleName(self.text)
 
+    def show_beginning(self, snapshot: Snapshot, title: str) -> None:
+        """Show that a run begins of which nothing is known yet, or that it did not."""
+        if snapshot.state.in_run:
+            stopping = snapshot.state is WindowState.ABORTING
+            self._say(STOPPING if stopping else f"{title} begins")
+        elif self._begins:
+            self._say(f"{title} did not begin")
+        else:
+            return
+        self._begins = snapshot.state.in_run
+        self._right.setText("")
+        self.blocks.show_steps([], 1.0, 0.0, "accent")
+        self.setAccessibleName(self.text)
+
     def _running(
         self,
         snapshot: Snapshot,
@@ -152,7 +170,7 @@ class ProgressStrip(QWidget):
         trial: tuple[int, str] | None,
     ) -> None:
         if snapshot.state is WindowState.ABORTING:
-            self._say("Stopping: the coil goes to 0 A and is read back")
+            self._say(STOPPING)
             self._right.setText(f"stopped at <b>{minutes(reach)}</b>")
             return
         if trial is None:

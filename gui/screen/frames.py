@@ -112,6 +112,8 @@ class FrameLoop(QObject):
                 kept=not unkept,
             )
             panels.setup.show_head(source.reach if session.state.in_run else None)
+        else:
+            panels.centre.progress.show_beginning(snapshot, session.run.title)
 
     def _show_monitor(self) -> None:
         panels, monitor = self._panels, self._panels.session.monitor

@@ -249,3 +249,43 @@ def test_nothing_is_queued_for_no_bench(lab) -> None:
     lab.until(lambda: session.state is WindowState.FAULT)
     assert not setup.buttons.queue.isEnabled()
     lab.window.banner.acknowledge.click()
+
+
+def test_between_two_runs_the_strip_tells_which_begins(lab, monkeypatch) -> None:
+    """It went on to say that a run was stopping: the one before, which had ended."""
+    window, session = lab.window, lab.session
+    begin = session.start
+
+    def start(request, title, plan) -> None:
+        begin(request, title, plan)
+        if title == "two":  # no word of it comes for a while
+            monkeypatch.setattr(session, "poll", lambda: False)
+
+    monkeypatch.setattr(session, "start", start)
+    for title in ("one", "two"):
+        session.queue.add(
+            Queued(title, window.setup.request(), session.plan.expectation)
+        )
+    session.queue.resume()
+    lab.until(lambda: session.run.title == "two")
+    progress = window.centre.progress
+    lab.until(lambda: progress.text == "two begins | ", longest=5.0)
+    assert session.state is WindowState.RUNNING and session.source is None
+    session.stop()
+    lab.until(lambda: progress.text.startswith("Stopping"), longest=5.0)
+    assert "stopped at" not in progress.text, "nothing of it has been"
+    monkeypatch.undo()
+    lab.until(lambda: not session.busy)
+    session.acknowledge()
+
+
+def test_the_strip_tells_that_a_refused_run_did_not_begin(lab, monkeypatch) -> None:
+    progress, session = lab.window.centre.progress, lab.session
+    monkeypatch.setattr(session, "poll", lambda: False)
+    strong = Request(str(lab.folder / "short.toml"), ('protocol.levels=["5 N"]',))
+    session.start(strong, "Strong")
+    lab.until(lambda: progress.text == "Strong begins | ")
+    monkeypatch.undo()
+    lab.until(lambda: session.state is WindowState.FAULT)
+    lab.until(lambda: progress.text != "Strong begins | ")
+    session.acknowledge()
