@@ -39,6 +39,8 @@ CARDS = (ONSET, SLOPE, ADAPTATION, FALL)
 SILENT = "No step that ended has fired."
 """Said also beside spikes of one that goes on, or that a fault ended."""
 
+UNENDED = "no step was completed: nothing is concluded"
+
 FULL = 0.1
 """Relative error at which a bar is full."""
 
@@ -167,19 +169,26 @@ def fit_steps(engine: Engine, steps: tuple[MeasuredTrial, ...], seen: FitInput) 
 
 
 def fit(findings: Sequence[MeasuredTrial], seen: FitInput) -> Fit:
-    """Fit the steps so far, and compare the run with the model."""
-    steps = [f for f in findings if f.level is not None]
-    model = [_modelled(f, seen.twin_spikes) for f in steps] if _has_model(seen) else []
+    """Fit the steps so far, and compare the run with the model.
+
+    Of a step that was cut short nothing is concluded, as in the report.
+    """
+    levelled = [f for f in findings if f.level is not None]
+    steps = [f for f in levelled if f.complete]
+    modelled = levelled if _has_model(seen) else []
+    model = [_modelled(f, seen.twin_spikes) for f in modelled]
     cards: tuple[Card, ...] = ()
-    why_not = next((f.uncounted for f in findings if f.uncounted), "")
+    missed = next((f.uncounted for f in findings if f.uncounted), "")
+    why_not = missed or ("" if steps else UNENDED)
     if why_not:
-        cards = tuple(Card(name, "—", _capital(why_not)) for name in CARDS if steps)
-    elif steps:
+        cards = tuple(Card(name, "—", _capital(why_not)) for name in CARDS if levelled)
+    else:
+        theirs = [f for f in model if f.complete]
         cards = (
-            _card(ONSET, _onset, steps, model),
-            _card(SLOPE, _slope, steps, model),
-            _adaptation(steps, model),
-            _fall(steps, model),
+            _card(ONSET, _onset, steps, theirs),
+            _card(SLOPE, _slope, steps, theirs),
+            _adaptation(steps, theirs),
+            _fall(steps, theirs),
         )
     points = tuple((f.level or 0.0, f.response.rates[0]) for f in model)
     apart = {
@@ -191,7 +200,7 @@ def fit(findings: Sequence[MeasuredTrial], seen: FitInput) -> Fit:
         Bar(signal, signal, min(found.error / FULL, 1.0), found.text)
         for signal, found in apart.items()
     ]
-    if not why_not:
+    if not missed:
         bars += _spikes(seen)
     return Fit(cards, tuple(bars), points, apart.get("V_C1"), tuple(_rates(steps)))
 

@@ -174,3 +174,18 @@ def test_the_fitted_rate_is_drawn_in_the_lane_and_over_the_steps() -> None:
     assert np.allclose(dashed.x, since)
     assert np.allclose(np.interp(dots[0].x, dashed.x, dashed.y), dots[0].y, rtol=0.05)
     assert train_plot([STEPS[0]]) is None, "none has fired"
+
+
+def test_a_step_that_was_cut_short_says_nothing_of_the_onset() -> None:
+    """STOP before it fired: "160 mN silent though 120 mN fired: not at rest"."""
+    cut = replace(STEPS[2], spike_times=np.empty(0), complete=False)
+    told = fit([*STEPS[:2], cut], seen()).cards
+    assert told == fit(STEPS[:2], seen()).cards, "as it was told before STOP"
+    assert told[0].detail == "80 to 120 mN"
+    alone = fit([cut], seen())
+    assert {(card.value, card.detail) for card in alone.cards} == {
+        ("—", "No step was completed: nothing is concluded.")
+    }
+    fired = replace(STEPS[3], complete=False)
+    assert fit([fired], seen()).cards == alone.cards, "nor does the report conclude"
+    assert fit([fired], seen()).model, "it is drawn all the same"
