@@ -182,6 +182,8 @@ def _in_use(heard: Heard | None, words: str, value: str) -> tuple[Lamp, str, str
     """Lamp, words and value of what a task uses, as long as its last word says so."""
     if heard is None:
         return Lamp.WAITING, "not heard yet", "—"
+    if heard.pauses:
+        return Lamp.GOOD, "pauses as planned", "idle"
     if heard.overdue:
         return Lamp.WAITING, f"silent for {heard.silent:.0f} s", "—"
     return Lamp.ACTIVE, words, value

@@ -13,15 +13,29 @@ class Heard:
 
     One that is slow, as a scope that reads records is, has been silent before: its
     word is overdue after twice its longest silence so far.
+
+    Attributes:
+        pauses: as planned, and is not due to say anything.
     """
 
     def __init__(self) -> None:
         self._last = monotonic()
         self._longest = 0.0
+        self.pauses = False
+
+    def pause(self) -> None:
+        """Nothing is due from it until it goes on."""
+        self.pauses = True
+
+    def go_on(self) -> None:
+        """Its next word is due: how long the pause was says nothing of it."""
+        self.pauses = False
+        self._last = monotonic()
 
     def word(self) -> None:
         """It said something again just now."""
-        self._longest = max(self._longest, self.silent)
+        if not self.pauses:
+            self._longest = max(self._longest, self.silent)
         self._last = monotonic()
 
     @property
@@ -32,4 +46,4 @@ class Heard:
     @property
     def overdue(self) -> bool:
         """Whether its last word does not say any more how it is."""
-        return self.silent > max(DUE, 2 * self._longest)
+        return not self.pauses and self.silent > max(DUE, 2 * self._longest)

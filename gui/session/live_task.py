@@ -13,6 +13,7 @@ from gui.session.heard import Heard
 from gui.session.log import Log
 from gui.session.status import Status
 from tactile_lab.acquisition.ending import CoilState, Ending
+from tactile_lab.acquisition.events import Streaming
 from tactile_lab.engine.engine import ServedTask
 from tactile_lab.engine.events import Begun, Ended, Samples, TaskEvent
 from tactile_lab.engine.link import Link, RemoteTask
@@ -70,6 +71,9 @@ class LiveTask(QObject):
             return
         if isinstance(event, Begun | Samples):
             self.heard = time.monotonic()
+        if isinstance(event, Streaming):
+            scope = self.answered.setdefault("scope", Heard())
+            (scope.go_on if event.on else scope.pause)()
         if isinstance(event, Samples):
             self.coil = event.coil
             if event.bins:

@@ -52,6 +52,13 @@ class RecordBegun:
 
 
 @dataclass(frozen=True)
+class Streaming:
+    """The scope streams from now on, or pauses as planned, until told otherwise."""
+
+    on: bool
+
+
+@dataclass(frozen=True)
 class TrialStarted:
     """Trial `index` begins at `start` s on the run's time axis."""
 
@@ -166,6 +173,7 @@ class Message:
 Event = (
     StateChanged
     | RecordBegun
+    | Streaming
     | TrialStarted
     | TrialEnded
     | Progress

@@ -100,12 +100,19 @@ class Pump:
 
     def ask(self, work: Callable[[], T]) -> T:
         """What a person comes back with; simulated time stands still meanwhile."""
+        scope = self._instruments.scope
+        streams = scope is not None and scope.stream is not None
+        stands = streams and self._clock.simulated
+        if stands:
+            self._account.emit(events.Streaming(False))
         prompt = Prompt(work)
         if not self._clock.simulated:
             self.until(lambda: prompt.ended)
         while not prompt.ended_within(PULSE):
             if self._stop.requested:
                 raise StopAskedError
+        if stands:
+            self._account.emit(events.Streaming(True))
         return prompt.result()
 
     def start_stream(self) -> None:
@@ -129,6 +136,7 @@ class Pump:
             self._learn(search, scope, stream)
         journal = self._account.journal or self._account.begin(stream)
         start = self._account.axis(stream.started)
+        self._account.emit(events.Streaming(True))
         if search is None:
             self._intake.begin(stream, start, journal)
             return
@@ -142,6 +150,7 @@ class Pump:
         if scope is None:
             return
         stream = scope.stream
+        self._account.emit(events.Streaming(False))
         scope.halt()
         self.until(lambda: scope.stream is None)
         # records with gaps are each dated by host time: there is nothing to align

@@ -2,10 +2,12 @@
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from benches import READ_BY_HAND
 from PySide6.QtWidgets import QApplication
 from serial import serial_for_url
 from served_source import Source
@@ -28,10 +30,23 @@ from gui.state import (
     truth,
 )
 from tactile_lab.acquisition.events import FieldRead, TemperatureRead, VoltageRead
+from tactile_lab.engine import execution
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
 
 LONGEST = 90.0
+
+SCOPE = """
+[scope]
+[[scope.channels]]
+signal = "V_C1"
+input = "A"
+range = "5 V"
+[[scope.channels]]
+signal = "V_K"
+input = "C"
+range = "5 V"
+"""
 
 
 @pytest.fixture
@@ -169,6 +184,70 @@ def test_a_scope_whose_samples_are_overdue_is_not_called_active(
         if session.busy:
             session.stop("enough")
             lab.until(lambda: session.state is WindowState.READY and not session.busy)
+
+
+def test_a_scope_that_pauses_as_planned_is_not_overdue(
+    lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A person moved the probes, and the scope was said to be silent meanwhile."""
+    session, opened = lab.session, execution.open_bench
+    monkeypatch.setattr(
+        execution,
+        "open_bench",
+        lambda *given, **how: replace(opened(*given, **how), place_probes=None),
+    )
+    quick = ('protocol.hold="0.2 s"', 'record.sample_rate="10 kS/s"')
+    wiring = Request("wiring_check", quick, "sim")
+    session.start(wiring, "Wiring", session.plan.expectation)
+    for _ in range(2):
+        lab.until(lambda: session.run.asked is not None)
+        with monkeypatch.context() as later:
+            later.setattr(heard, "monotonic", lambda: time.monotonic() + 100)
+            seen = scope_of(session)
+        assert seen.lamp is Lamp.GOOD and "silent" not in seen.detail
+        session.run.answer()
+    session.stop("enough")
+    lab.until(lambda: session.state is WindowState.READY and not session.busy)
+
+
+def test_a_scope_is_not_overdue_while_simulated_time_stands_still(
+    lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A person was to read the field, and a simulated scope was called silent."""
+    session, bench = lab.session, lab.folder / "by_hand.toml"
+    bench.write_text(READ_BY_HAND + SCOPE)
+    session.connect_bench(str(bench))
+    lab.until(lambda: session.state is WindowState.READY)
+    signals = ('record.signals=["V_C1", "V_K", "field"]',)
+    asked = Request(str(lab.folder / "short.toml"), signals, str(bench))
+    session.start(asked, "By hand", session.plan.expectation)
+    lab.until(lambda: session.run.asked is not None)
+    for ahead in (0, 100):
+        with monkeypatch.context() as later:
+            later.setattr(heard, "monotonic", lambda by=ahead: time.monotonic() + by)
+            assert scope_of(session).lamp is Lamp.GOOD
+    session.stop("enough")
+    lab.until(lambda: session.state is WindowState.READY and not session.busy)
+    session.connect_bench("sim")
+    lab.until(lambda: session.state is WindowState.READY)
+
+
+def test_what_goes_on_after_a_pause_is_due_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = [0.0]
+    monkeypatch.setattr(heard, "monotonic", lambda: clock[0])
+    one = heard.Heard()
+    one.pause()
+    clock[0] = 50.0
+    one.word()  # the last of what was streamed
+    assert not one.overdue
+    clock[0] = 100.0
+    one.go_on()
+    clock[0] = 100.9
+    assert not one.overdue
+    clock[0] = 101.1
+    assert one.overdue, "and the pause says nothing of how slow it is"
 
 
 def test_who_is_slow_is_not_overdue(monkeypatch: pytest.MonkeyPatch) -> None:
