@@ -15,9 +15,19 @@ LAGS, MOVED = 0.3, 5e-3
 by so much since, A."""
 
 
+IN_THE_WINDOW = {
+    "with --out": "in Settings",
+    "run `tactile-lab recover` on this run": "recover this run in Runs",
+    "`": "",
+}
+"""Words of a terminal, and what a window has for them."""
+
+
 def unmarked(text: str) -> str:
-    """A message as a window says it: no back-ticks of a terminal, and no options."""
-    return text.replace("`", "").replace("with --out", "in Settings")
+    """A message as a window says it: no back-ticks, options or verbs of a terminal."""
+    for theirs, ours in IN_THE_WINDOW.items():
+        text = text.replace(theirs, ours)
+    return text
 
 
 class WindowState(Enum):

@@ -20,6 +20,7 @@ from gui.screen.records import Records
 from gui.session.log import Severity
 from gui.session.session import BY_HAND
 from gui.state import WindowState
+from tactile_lab.acquisition.events import RunState
 from tactile_lab.engine.memory import trim
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import RunFolderError, TactileLabError
@@ -261,11 +262,14 @@ class Screen(QObject):
     def run_ended(self, done: Executed) -> None:
         """The run is on disk now."""
         self.ending = _ended(done.state, done.folder, done.spikes)
+        stored = (done.folder / DATA).exists()  # not where it was deleted meanwhile
+        if done.state is RunState.FAULTED and not stored:
+            self.run_cut("Broke")
         source = self._panels.session.source
         if source is not None:
             self._panels.centre.view.set_now(source.reach, source.length)
         self.results.end(done, source)
-        if (done.folder / DATA).exists():  # not where it ended before the first sample
+        if stored:  # nor where it ended before the first sample
             self._ended = done.folder
             self._records.exchange(done.folder)
         QTimer.singleShot(LATER, self.list_runs)

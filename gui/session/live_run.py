@@ -30,7 +30,7 @@ from tactile_lab.engine.jobs import follow_run, write_report
 from tactile_lab.engine.link import Link
 from tactile_lab.engine.request import Request
 from tactile_lab.quantity import looked_for, show
-from tactile_lab.store.folder import REPORT
+from tactile_lab.store.folder import DATA, REPORT
 
 if TYPE_CHECKING:
     from gui.session.expectation import Expectation
@@ -234,6 +234,8 @@ class LiveRun(LiveTask):
             status.set_fault("The coil's state is unknown after the run.", off.text)
         elif done.state is events.RunState.FAULTED:
             kept = f"What was recorded in {done.duration:.1f} s is in {folder.name}. "
+            if not (folder / DATA).exists():
+                kept = f"Nothing of it is in {folder.name}. "
             left = f"Coil off, {milliamperes(off.current)} read back."
             status.set_fault(done.reason or "The run faulted.", kept + left)
         else:

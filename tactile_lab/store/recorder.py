@@ -333,11 +333,14 @@ class Recorder:
                 self._write_rows(self._file)
         finally:
             self._file.close(failed=self._failed)
+        self._look_for_it()
+
+    def _look_for_it(self, cause: Exception | None = None) -> None:
         if not (self.folder.path / DATA).exists():
             raise RecordingError(
                 f"{self.folder.path / DATA} is gone: it was moved or deleted while the "
                 "run was recorded. Put it back if you have it."
-            )
+            ) from cause
 
     def _guard(self, write: Callable[..., None], *what: Any) -> None:
         """Turn what a disk can do to us into a message that says what is kept."""
@@ -348,6 +351,7 @@ class Recorder:
             raise
         except (OSError, RuntimeError, ValueError) as error:
             self._failed = True
+            self._look_for_it(error)
             kept = min((column.written for column in self._columns), default=0)
             raise RecordingError(
                 f"{self.folder.path / DATA} cannot be written: {error}. The first "

@@ -3,6 +3,7 @@
 import json
 import threading
 from dataclasses import replace
+from shutil import rmtree
 
 import pytest
 from PySide6.QtCore import Qt
@@ -23,6 +24,7 @@ from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.bench import OffReport
 from tactile_lab.engine import memory
+from tactile_lab.store.recorder import Recorder
 from tactile_lab.waveform import Waveform
 
 FORCE = """
@@ -295,3 +297,33 @@ def test_esc_closes_a_card_between_runs_and_is_stop_in_one(lab) -> None:
     QTest.keyClick(card.close_button, Qt.Key.Key_Escape)
     assert session.state is WindowState.ABORTING
     card.hide()
+
+
+def test_a_run_whose_folder_is_deleted_is_told_in_words_of_the_window(lab) -> None:
+    """Of a folder that was gone it said what is kept, and to run recover with --out."""
+    session = lab.session
+    lab.run()
+    lab.until(lambda: session.source.reach > 1.0)
+    rmtree(session.run.folder)
+    lab.until(lambda: session.state is WindowState.FAULT and not session.busy)
+    fault = session.status.fault
+    assert "is gone: it was moved or deleted" in fault.title
+    assert "recover" not in fault.title and "kept" not in fault.title
+    assert fault.consequence.startswith("Nothing of it is in ")
+    lab.until(lambda: lab.window.centre.progress.text.startswith("Broke"))
+    assert "kept" not in lab.window.centre.progress.text
+
+
+def test_a_disk_that_is_full_is_told_in_words_of_the_window(lab, monkeypatch) -> None:
+    session = lab.session
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    lab.run()
+    lab.until(lambda: session.source.reach > 1.0)
+    monkeypatch.setattr(Recorder, "_write_samples", full)
+    lab.until(lambda: session.state is WindowState.FAULT and not session.busy)
+    told = session.status.fault.title
+    assert "choose another folder in Settings, and recover this run in Runs" in told
+    assert "tactile-lab" not in told and "--out" not in told
