@@ -216,13 +216,11 @@ class ConnectedBench(QObject):
             status.lose_engine()
             return
         if found is None:
-            words = ("The bench cannot be used.", reply.problem)
-            self._log.add(Severity.ERROR, "bench", " ".join(words))
             if self.found is None:
                 self.spec = self.choice = None
             self.found = None
             status.coil.left(UNKNOWN)  # nobody looked, and somebody may be using it
-            status.set_fault(*words)
+            status.set_fault("The bench cannot be used.", reply.problem)
             return
         broken = [one for one in found.found if one.problem]
         coil = self.spec.coil if self.spec is not None else None

@@ -204,9 +204,7 @@ class LiveRun(LiveTask):
         self._early = []
         if ending.state is events.RunState.REFUSED:
             self.name = ""
-            words = ("The run was refused.", ending.reason or "")
-            self._log.add(Severity.ERROR, "bench", " ".join(words))
-            status.set_fault(*words)
+            status.set_fault("The run was refused.", ending.reason or "")
         elif ending.state is events.RunState.LOST:
             status.lose_engine(kept=True)
             self.cut.emit("Cut short")

@@ -24,6 +24,7 @@ from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.bench import OffReport
 from tactile_lab.engine import memory
+from tactile_lab.engine.request import Request
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.waveform import Waveform
 
@@ -327,3 +328,25 @@ def test_a_disk_that_is_full_is_told_in_words_of_the_window(lab, monkeypatch) ->
     told = session.status.fault.title
     assert "choose another folder in Settings, and recover this run in Runs" in told
     assert "tactile-lab" not in told and "--out" not in told
+
+
+def test_a_refused_run_is_logged_once(lab) -> None:
+    session = lab.session
+    strong = Request(str(lab.folder / "short.toml"), ('protocol.levels=["5 N"]',))
+    said = len(session.log.lines)
+    session.start(strong, "Strong")
+    lab.until(lambda: session.state is WindowState.FAULT)
+    told = [one for one in session.log.lines[said:] if "was refused" in one.text]
+    assert len(told) == 1 and told[0].safety
+    session.acknowledge()
+
+
+def test_a_bench_that_is_refused_is_logged_once(lab) -> None:
+    session = lab.session
+    session.bench.request = replace(session.bench.request, path="no such scene")
+    said = len(session.log.lines)
+    session.bench.check()
+    lab.until(lambda: session.state is WindowState.FAULT)
+    told = [one.text for one in session.log.lines[said:]]
+    assert len([text for text in told if "The bench cannot be used." in text]) == 1
+    session.acknowledge()
