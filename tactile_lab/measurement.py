@@ -23,6 +23,7 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.quantity import count
 from tactile_lab.signals import Source
 from tactile_lab.waveform import Waveform
 
@@ -103,6 +104,8 @@ class MeasuredTrial:
             the scope's clock is aligned with the host's; None if not known.
         uncounted: why its spikes are not all counted, `CUT_OFF` or `BETWEEN_SAMPLES`:
             those seen are told, and no latency, rate or fit. "" where all are.
+        skipped: the coil's set-points that came too late: its force was not all that
+            was asked for.
     """
 
     label: str
@@ -118,6 +121,14 @@ class MeasuredTrial:
     complete: bool = True
     clock_uncertainty: float | None = None
     uncounted: str = ""
+    skipped: int = 0
+
+    @property
+    def name(self) -> str:
+        """What its protocol calls it, whether it came to its end, and as asked for."""
+        cut = [] if self.complete else ["cut short"]
+        late = [f"{count(self.skipped, 'set-point')} skipped"] if self.skipped else []
+        return ", ".join([self.label, *cut, *late])
 
     @property
     def held(self) -> tuple[float, float] | None:

@@ -21,7 +21,7 @@ def cells(step: MeasuredTrial) -> tuple[str, ...]:
     """One row of the table of steps."""
     found = step.response
     return (
-        step.label if step.complete else f"{step.label}, cut short",
+        step.name,
         step.seen,
         "—" if found.latency is None else number(found.latency * 1e3, 0),
         "—" if found.peak_rate is None else number(found.peak_rate, 1),
@@ -49,6 +49,7 @@ def of_outcome(outcome: Outcome, uncounted: str = "") -> MeasuredTrial | None:
         onset=_begun(outcome),
         hold=trial.hold,
         uncounted=uncounted,
+        skipped=outcome.skipped,
     )
 
 
@@ -83,6 +84,7 @@ def of_run(source: RunSource) -> list[MeasuredTrial]:
                 hold=span if span[0] == span[0] else None,
                 complete=bool(row["complete"]),
                 uncounted=uncounted,
+                skipped=int(row["skipped"]),
             )
         )
     return found

@@ -254,6 +254,7 @@ def _trial(
         drift=_number(row, "drift_V_C1"),
         clock_uncertainty=clock,
         uncounted=why_not,
+        skipped=int(row["skipped"]),
     )
 
 

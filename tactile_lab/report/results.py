@@ -101,6 +101,7 @@ def _trial(run: RunData, trial: MeasuredTrial) -> dict[str, Any]:
         "spikes": response.spikes,
         "ramp_spikes": response.ramp_spikes,
         "uncounted": trial.uncounted or None,
+        "skipped": trial.skipped,
         "spike_times_s": [float(t) for t in trial.spike_times],
         "latency_s": response.latency,
         "latency_uncertainty_s": None

@@ -24,7 +24,7 @@ def trials_table(run: Measurement) -> Table:
             headings=("Trial", "Start", "Length", "V_C1 before"),
             rows=tuple(
                 (
-                    _name(trial),
+                    trial.name,
                     show(trial.start, "s"),
                     show(trial.duration, "s"),
                     _shown(trial.rest, "V", 4),
@@ -44,14 +44,14 @@ def trials_table(run: Measurement) -> Table:
         note += " Force: ± its 95 % uncertainty by calibration and geometry."
     if any(trial.uncounted for trial in run.results):
         note += f" {DAGGER}: not all spikes are counted, these were seen."
-    named = any(_name(trial) != _force(trial) for trial in run.results)
+    named = any(trial.name != _force(trial) for trial in run.results)
     headings = (
         *("Trial",) * named,
         *("Force", "Spikes", "In ramps", "First spike", "Peak rate", "Final rate"),
         *("Fall in hold", "Time constant"),
     )
     rows = tuple(
-        (*(_name(trial),) * named, *_row(run, trial), constant)
+        (*(trial.name,) * named, *_row(run, trial), constant)
         for trial, constant in zip(run.results, _time_constants(run), strict=True)
     )
     return Table(headings=headings, rows=rows, note=note)
@@ -74,7 +74,7 @@ def _field_table(run: Measurement) -> Table:
         elif field.size:
             shown = show(float(field[0]), "T", 4)
         at, read = show(trial.start, "s"), str(field.size)
-        rows.append((_name(trial), at, _shown(current, "A", 4), shown, read))
+        rows.append((trial.name, at, _shown(current, "A", 4), shown, read))
     return Table(
         headings=("Trial", "Start", "Current", "Field", "Readings"),
         rows=tuple(rows),
@@ -90,7 +90,7 @@ def fits_table(run: Measurement) -> Table:
         fit = trial.adaptation
         if fit is None:
             continue
-        cells = [_name(trial)]
+        cells = [trial.name]
         for estimate, unit in ((fit.alpha, "Hz"), (fit.beta, "1/s"), (fit.gamma, "Hz")):
             cells.append(_ranged(estimate, unit) + "*" * fit.systematic)
         cells += [f"{fit.irregularity:.3f}", f"{fit.r_squared:.4f}", str(fit.intervals)]
@@ -116,7 +116,7 @@ def circuit_fits_table(run: Measurement) -> Table:
         last = NONE if fit.silent_from is None else show(fit.silent_from, "s", 4)
         rows.append(
             (
-                _name(trial),
+                trial.name,
                 _ranged(fit.tau, "s"),
                 plus_minus(fit.V_GS.value, fit.V_GS.half, "V"),
                 plus_minus(fit.V_P.value, fit.V_P.half, "V"),
@@ -155,11 +155,6 @@ def _row(run: Measurement, trial: MeasuredTrial) -> tuple[str, ...]:
         _shown(response.final_rate, "Hz"),
         NONE if response.fall is None else f"{100 * response.fall:.0f} %",
     )
-
-
-def _name(trial: MeasuredTrial) -> str:
-    """What its protocol calls it, and whether it came to its end."""
-    return trial.label if trial.complete else f"{trial.label}, cut short"
 
 
 def _force(trial: MeasuredTrial) -> str | None:

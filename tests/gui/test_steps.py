@@ -9,6 +9,9 @@ from PySide6.QtTest import QTest
 from gui.lanes.live import LiveSource
 from gui.session.steps import of_run
 from gui.state import WindowState
+from sim_backend.bench import open_bench
+from sim_backend.serial_line.faults import SerialFault
+from tactile_lab.engine import execution
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -109,3 +112,21 @@ def test_a_step_that_stop_cut_short_has_its_results(lab) -> None:
     seen = window.screen_.run.spikes.size
     assert table.item(0, 1).text() == f"{seen}†", "at 20 kS/s most are missed"
     assert "partial" in window.review.results.mark.text()
+
+
+def test_a_step_whose_set_points_came_too_late_says_so(lab, monkeypatch) -> None:
+    """The run was complete, and only the log told that a step was not as asked."""
+
+    def late(scene, needed, *, realtime):
+        fault = SerialFault(kind="late", amount=0.25, line=r"^CURR 0\.[1-9]")
+        return open_bench(scene, needed, coil_faults=[fault])
+
+    monkeypatch.setattr(execution, "open_bench", late)
+    folder = lab.complete_run()
+    lab.complete.remove(folder)  # as others are wanted
+    screen, table = lab.window.screen_, lab.window.review.results.table
+    live = [step.name for step in screen.results.steps]
+    lab.until(lambda: getattr(screen.run, "path", None) == folder)
+    assert [step.name for step in screen.results.steps] == live
+    assert "set-point" in live[0] and "skipped" in live[0] and live[1] == "120 mN"
+    assert table.item(0, 0).text() == live[0] == table.item(0, 0).toolTip()

@@ -12,7 +12,10 @@ from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.engine.execution import Execution
 from tactile_lab.planning.needs import needs
+from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
+from tactile_lab.report.results import results
+from tactile_lab.report.table import trials_table
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
 
@@ -68,6 +71,10 @@ def test_set_points_that_came_too_late_are_told_and_stored(tmp_path: Path) -> No
     done, _ = run(tmp_path, SerialFault(kind="late", amount=0.25, line=PULSE))
     with Run.load(done.folder) as stored:
         assert stored.trials["skipped"].sum() > 0
+        skipped = int(stored.trials["skipped"][0])
+    found = find(read(done.folder))
+    assert f"120 mN, {skipped} set-point" in trials_table(found.run).rows[0][0]
+    assert results(found)["trials"][0]["skipped"] == skipped
     log = (done.folder / "log.jsonl").read_text(encoding="utf-8")
     assert "coil set-points came too late and were skipped" in log
     assert "the source answered late" in log and "computer" not in log
