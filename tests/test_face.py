@@ -11,6 +11,8 @@ import pytest
 
 import tactile_lab
 from tactile_lab.errors import InstrumentError, RunFolderError, SceneError
+from tactile_lab.store import run as stored
+from tactile_lab.store.uncounted import uncounted
 
 SHORT = {
     "protocol.levels": [0.18],
@@ -124,6 +126,20 @@ def test_a_run_tells_its_adaptation_by_the_circuit_s_own_law(run):
     assert found.V_GS.value == pytest.approx(1.4, abs=5e-3)
     with pytest.raises(IndexError):
         run.adaptation(7)
+
+
+def test_which_spikes_are_counted_is_asked_once_for_all_trials(run, monkeypatch):
+    """It was asked of all trials for each of them, and reads where a channel left."""
+    asked = []
+
+    def counting(of):
+        asked.append(of)
+        return uncounted(of)
+
+    monkeypatch.setattr(stored, "uncounted", counting)
+    with tactile_lab.Run.load(run.path) as again:
+        assert again.adaptation().tau.value == again.adaptation(-1).tau.value
+        assert asked == [again]
 
 
 def test_signals_in_columns_stored_and_derived(run):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,7 +64,8 @@ class Run(StoredRun):
         start, end = (float(row["start"] + row[n]) for n in ("hold_start", "hold_end"))
         if not start < end:
             raise NotIdentifiableError("the trial has no hold")
-        if why := uncounted(self)[trial]:
+        growing = self.status == "running"
+        if why := (uncounted(self) if growing else self._uncounted)[trial]:
             raise NotIdentifiableError(why)
         arrived = self.force.arrival((start + end) / 2, float(row["start"]))
         return fit_circuit_adaptation(
@@ -72,6 +74,10 @@ class Run(StoredRun):
             (max(start, arrived) + FOLLOWED, end),
             self.scene.displaced.values(),
         )
+
+    @cached_property
+    def _uncounted(self) -> list[str]:
+        return uncounted(self)
 
     def to_xarray(
         self,
