@@ -9,6 +9,7 @@ from gui.state import STALE, CoilView
 from tactile_lab.bench import CoilLimits, OffReport
 
 if TYPE_CHECKING:
+    from gui.session.heard import Heard
     from tactile_lab.acquisition.ending import CoilState
 
 
@@ -63,13 +64,13 @@ class CoilWatch:
         self._sign = time.monotonic()
 
     def view(
-        self, state: CoilState | None, heard: float | None = None
+        self, state: CoilState | None, heard: Heard | None = None
     ) -> CoilView | None:
         """What may be shown.
 
         Args:
             state: of the coil, as told last; None while nobody drives it.
-            heard: when whoever may switch it on told so, s; None while nobody may.
+            heard: of whoever may switch it on; None while nobody may.
         """
         if self.limits is None:
             return None
@@ -77,7 +78,7 @@ class CoilWatch:
         if state is None or not state.live:
             self._read = NEVER
             off = None if state is None else state.off
-            if off is None and (heard is None or now - heard <= STALE):
+            if off is None and (heard is None or heard.silent <= STALE):
                 off = self._off  # nothing was switched on: as it was left before
             if off is None:
                 return CoilView(None, limit=limit)

@@ -1,4 +1,4 @@
-"""When an instrument was heard last, and whether its next word is overdue."""
+"""When an instrument or a task was heard last, and whether its word is overdue."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ DUE = 1.0
 
 
 class Heard:
-    """Words of one instrument while a task uses it, from its first on.
+    """Words of a task, or of one instrument while a task uses it, from its first on.
 
     One that is slow, as a scope that reads records is, has been silent before: its
     word is overdue after twice its longest silence so far.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from abc import abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
@@ -30,8 +29,8 @@ class LiveTask(QObject):
     Attributes:
         task: in the engine; None between two.
         coil: its state, as told last; None before the first word and after the end.
-        heard: when that was, s; None where it cannot switch anything on: before it has
-            begun, and after the end.
+        heard: of it; None where it cannot switch anything on: before it has begun, and
+            after the end.
         answered: role -> when that instrument was heard; none before its first word.
     """
 
@@ -40,7 +39,7 @@ class LiveTask(QObject):
         self._link, self._status, self._log = link, status, log
         self.task: RemoteTask | None = None
         self.coil: CoilState | None = None
-        self.heard: float | None = None
+        self.heard: Heard | None = None
         self.answered: dict[str, Heard] = {}
 
     @property
@@ -70,7 +69,8 @@ class LiveTask(QObject):
             self.has_ended(event.ending)
             return
         if isinstance(event, Begun | Samples):
-            self.heard = time.monotonic()
+            self.heard = self.heard or Heard()
+            self.heard.word()
         if isinstance(event, Streaming):
             scope = self.answered.setdefault("scope", Heard())
             (scope.go_on if event.on else scope.pause)()

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from gui.session import coil, live_task
+from gui.session import coil, heard
 from gui.session.live_task import LiveTask
 from gui.session.session import Session
 from gui.state import STALE, CoilKnowledge, WindowState, stop_text, truth
@@ -56,7 +56,7 @@ def told(
     made = Told(tmp_path)
     clock = SimpleNamespace(monotonic=lambda: made.now)
     monkeypatch.setattr(coil, "time", clock)
-    monkeypatch.setattr(live_task, "time", clock)
+    monkeypatch.setattr(heard, "monotonic", clock.monotonic)
     yield made
     made.session.close()
 
