@@ -289,4 +289,7 @@ class SimulatedSensor:
         time = np.sort(np.concatenate([time, spikes, resets, resets]))
         value = solved.sample(signal, time)
         value[np.searchsorted(time, resets, side="left")] = chunk.circuit.fire_voltage
+        # the sample may lie a rounding before the end of the reset
+        after = np.searchsorted(time, resets, side="right") - 1
+        value[after] = chunk.circuit.reset_voltage
         return Pieces.through(time, value)
