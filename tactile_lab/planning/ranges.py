@@ -10,17 +10,26 @@ from dataclasses import replace
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import SolverError
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scope import Channel
+from tactile_lab.waveform import Waveform
 
 NODES = ("V_C1", "V_C2", "V_K")
 """Voltages of the circuit between 0 V and its supply."""
 
 GRID = 4000
-"""Points at which the model is looked at."""
+"""Points at which the model is looked at, and those after each bend of the force."""
+
+STEPS = 4
+"""Into so many steps the time constant of node A is divided after a bend."""
+
+AFTER = (0, 2, 4, 8, 16)
+"""Steps after a bend at which the model is looked at: V_C1 has one extremum at most
+between two bends, and not much later than the first."""
 
 SPARE = 1 / 127
 """Part of a range, one code of 8 bits, that should be left at either end."""
@@ -46,7 +55,8 @@ def expected(scene: Scene, channels: Sequence[Channel], drive: Timeline) -> Extr
     from tactile_lab.planning.preview import in_slices
 
     until = drive.duration
-    looked = [Samples(name, np.linspace(0.0, until, GRID), until) for name in names]
+    time = _looked_at(drive.force, until, scene.circuit.tau_A)
+    looked = [Samples(name, time, until) for name in names]
     try:
         for part in in_slices(scene, drive.force, until, names):
             for samples in looked:
@@ -59,6 +69,15 @@ def expected(scene: Scene, channels: Sequence[Channel], drive: Timeline) -> Extr
         low, high = told["V_C2"]
         told["V_C2"] = min(low, 0.0), max(high, scene.circuit.fire_voltage)
     return told
+
+
+def _looked_at(force: Waveform, until: float, tau: float) -> FloatArray:
+    """Where extremes may lie, s; a list bends more often than `tau`."""
+    step = tau / STEPS
+    bends = np.unique(np.rint(force.time / step))
+    after = np.unique(np.add.outer(bends, AFTER)) * step
+    even = np.linspace(0.0, until, GRID)
+    return np.concatenate([even, after[(after >= 0.0) & (after <= until)]])
 
 
 def fitted(channel: Channel, seen: Extremes, ranges: Sequence[float]) -> Channel:

@@ -173,6 +173,18 @@ def test_a_range_is_widened_where_the_model_expects_more(fixed_ranges):
     assert ranges("monitor")["V_C1"] == 2.0
 
 
+def test_a_short_push_in_a_long_run_is_expected_as_deep_as_it_goes():
+    """Of 20 s of scans V_C1 lies below 0.5 V for 5 ms, once."""
+    scan = [
+        "protocol.period=3 mm",
+        'protocol.speeds=["30 mm/s"]',
+        "protocol.lasts=1.2 s",
+    ]
+    made = plan(load("texture", scan), preview=False)
+    (channel,) = [c for c in made.needs.channels if c.signal == "V_C1"]
+    assert channel.span[0] < 0.468
+
+
 def test_a_force_beyond_all_ranges_is_warned_of():
     far = ['protocol.levels=["350 mN"]', "protocol.ramp=0.4 s"]
     (channel,) = [
