@@ -20,6 +20,7 @@ from tactile_lab.analysis.estimate import Estimate, student_95
 from tactile_lab.analysis.spike_train import intervals, within
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.quantity import rounded
 
 FEWEST_INTERVALS = 10
 STEEPEST = 300.0
@@ -123,19 +124,19 @@ def fit_adaptation(spike_times: ArrayLike, hold: tuple[float, float]) -> Adaptat
         raise NotIdentifiableError("no bend towards a final rate yet: hold longer")
     if length < SHORTEST_HOLD / -beta:
         raise NotIdentifiableError(
-            f"2/|beta|, about {SHORTEST_HOLD / -beta:.2g} s, exceeds the hold of "
+            f"2/|beta|, about {rounded(SHORTEST_HOLD / -beta)} s, exceeds the hold of "
             f"{length:.3g} s"
         )
     if -1 / beta < (shortest := float(np.min(ends - starts))):
         raise NotIdentifiableError(
-            f"1/|beta|, about {-1 / beta:.2g} s, is below the shortest interval, "
+            f"1/|beta|, about {rounded(-1 / beta)} s, is below the shortest interval, "
             f"{shortest:.2g} s, so that one interval alone would tell it"
         )
     if alpha.low <= 0:
         raise NotIdentifiableError("the fall is within the train's irregularity")
     if quantile * error >= -beta:
         raise NotIdentifiableError(
-            f"1/|beta|, about {-1 / beta:.2g} s, is as uncertain as it is large"
+            f"1/|beta|, about {rounded(-1 / beta)} s, is as uncertain as it is large"
         )
     spread = quantile * error / -beta
     constant = Estimate(

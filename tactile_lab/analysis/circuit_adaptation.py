@@ -25,7 +25,7 @@ from tactile_lab.analysis.spike_train import within
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.quantity import count
+from tactile_lab.quantity import count, rounded
 
 FEWEST_INTERVALS = 6
 LUCKY = 0.95
@@ -121,8 +121,8 @@ def fit_circuit_adaptation(
     luck = math.sqrt(freedom / float(chdtri(freedom, LUCKY)))
     if not log_tau.half * luck < math.log(2):
         raise NotIdentifiableError(
-            f"the hold does not determine tau: about {tau:.2g} s, no better known than "
-            "by a factor 2"
+            f"the hold does not determine tau: about {rounded(tau)} s, no better known "
+            "than by a factor 2"
         )
     law_rate = 1 / law.interval(theta, times)
     rms = float(np.sqrt(np.mean((1 / np.diff(times) - law_rate) ** 2)))

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from tactile_lab.analysis.estimate import Estimate, correlated, student_95
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError, ParameterError
+from tactile_lab.quantity import rounded
 
 FEWEST = 12
 SHORTEST_HOLD = 2.0
@@ -103,7 +104,7 @@ def fit_decay(
     needed = SHORTEST_HOLD if rest is None else SHORTEST_HOLD_WITH_REST
     if length < needed * tau:
         raise NotIdentifiableError(
-            f"a hold of {length:.3g} s does not determine tau, about {tau:.2g} s: "
+            f"a hold of {length:.3g} s does not determine tau, about {rounded(tau)} s: "
             f"{needed:g} tau are needed"
         )
     return _decay(theta, points)
@@ -189,8 +190,8 @@ def _decay(theta: FloatArray, points: _Points) -> Decay:
     tau = float(np.exp(theta[0]))
     if not np.isfinite(factor) or factor > 2:
         raise NotIdentifiableError(
-            f"the hold does not determine tau: about {tau:.2g} s, no better known than "
-            "by a factor 2; hold longer or give the current at rest"
+            f"the hold does not determine tau: about {rounded(tau)} s, no better known "
+            "than by a factor 2; hold longer or give the current at rest"
         )
     return Decay(
         tau=Estimate(

@@ -17,7 +17,7 @@ from tactile_lab.planning.reasons import Reasons, leaves_out, uses
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.planning.warn import assumptions, cheaper, warnings
 from tactile_lab.planning.ways import WayInstead, WayUsed, ways_instead, ways_used
-from tactile_lab.quantity import bytes_text, count, show
+from tactile_lab.quantity import bytes_text, count, rounded, show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.signals import BENCH_ONLY, SIGNALS
 
@@ -316,7 +316,7 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
     yield (
         "coil",
         f"peak {show(cost.peak_current, 'A')} for {show(cost.peak_force, 'N')}, heat "
-        f"{cost.heat:.2g} of {cost.heat_budget:g} A² s"
+        f"{rounded(cost.heat)} of {cost.heat_budget:g} A² s"
         + (f", cold {show(cost.cool_down, 's')} later" if cost.cool_down else ""),
     )
     ways = {used.way for used in plan.ways}
@@ -360,7 +360,7 @@ def _saved(saving: Saving) -> str:
 
 def _rounded(seconds: float) -> str:
     """A time that is not known better than to two digits."""
-    return show(seconds, "s", 2) if seconds < 100 else f"{seconds / 60:.2g} min"
+    return show(seconds, "s", 2) if seconds < 100 else f"{rounded(seconds / 60)} min"
 
 
 def _grouped(rows: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:

@@ -15,7 +15,7 @@ from tactile_lab.planning.estimate import Cost, resolution
 from tactile_lab.planning.needs import Needs
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.planning.ways import ways_used
-from tactile_lab.quantity import bytes_text, show
+from tactile_lab.quantity import bytes_text, rounded, show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import Simulated
 from tactile_lab.spikes.detection import DEVIATIONS
@@ -54,8 +54,9 @@ def _ways(scene: Scene, drive: Timeline) -> Iterator[str]:
         if used.part > scene.force_accuracy:
             yield (
                 f"no way of this bench brings the force nearer than "
-                f"{100 * used.part:.2g} % of its range, {show(used.error, 'N', 2)}; "
-                f"{100 * scene.force_accuracy:.2g} % are wanted. Ask for a slower "
+                f"{rounded(100 * used.part)} % of its range, "
+                f"{show(used.error, 'N', 2)}; "
+                f"{rounded(100 * scene.force_accuracy)} % are wanted. Ask for a slower "
                 "force, or allow more by [coil] accuracy."
             )
 

@@ -12,7 +12,7 @@ from tactile_lab.drive import Drive
 from tactile_lab.errors import SceneError
 from tactile_lab.planning.outcome import Step
 from tactile_lab.planning.way import drive_for
-from tactile_lab.quantity import count, show
+from tactile_lab.quantity import count, rounded, show
 from tactile_lab.scene.scene import Scene
 
 
@@ -45,7 +45,8 @@ class WayUsed:
             lags = f", and by {show(self.unsure, 'N', 2)} as lags are not known better"
         return (
             f"{count(self.trials, 'trial')}: {self.why}; the force errs by up to "
-            f"{show(self.error, 'N', 2)}, {100 * self.part:.2g} % of its range{lags}"
+            f"{show(self.error, 'N', 2)}, {rounded(100 * self.part)} % of its range"
+            f"{lags}"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -102,7 +103,7 @@ class WayInstead:
             return self.why_not
         return (
             f"the force of that trial would err by up to {show(self.error, 'N', 2)}, "
-            f"{100 * self.part:.2g} % of its range, loaded in "
+            f"{rounded(100 * self.part)} % of its range, loaded in "
             f'{show(self.load, "s", 2)} ([coil] way = "{self.way}")'
         )
 

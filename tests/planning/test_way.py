@@ -132,3 +132,12 @@ def test_the_plan_says_what_the_other_ways_would_leave(tmp_path):
     assert [used.way for used in wired.ways] == ["generator"]
     assert wired.ways_instead == () and wired.timeline.loading < 0.1
     assert plan(load("demo", (*SHORT, "coil.way=list"))).ways_instead == ()
+
+
+def test_an_error_of_the_whole_range_is_written_out(tmp_path):
+    """Not as "1e+02 %"."""
+    file = tmp_path / "jump.csv"
+    file.write_text("time_s,force_N\n0,-0.15\n0.5,-0.15\n0.5,0.18\n2,0.18\n")
+    told = text(plan(load("waveform", [f"protocol.file={file}"])))
+    assert "100 % of its range" in told
+    assert "e+0" not in told
