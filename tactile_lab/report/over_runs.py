@@ -95,12 +95,14 @@ class OverRuns:
         if self.chart is None:
             return [*said, f"{LEAST} runs or more say what is usual."]
         chart = self.chart
+        low, high, *outside = self._told_apart(
+            chart.low, chart.high, *(self.points[i].value for i in chart.outside)
+        )
         said.append(
-            f"Usual is {show(chart.low, self.unit)} to {show(chart.high, self.unit)} "
+            f"Usual is {low} to {high} "
             "(mean ± 2.66 mean moving ranges, Shewhart's chart of single values)."
         )
-        for i in chart.outside:
-            told = show(self.points[i].value, self.unit)
+        for i, told in zip(chart.outside, outside, strict=True):
             said.append(f"{self.points[i].run} lies outside: {told}.")
         if chart.drifting:
             said.append(
@@ -110,6 +112,15 @@ class OverRuns:
         if not (chart.outside or chart.drifting):
             said.append("All lie within, and none drifts.")
         return said
+
+    def _told_apart(self, low: float, high: float, *outside: float) -> list[str]:
+        """The limits and what lies outside, in digits that tell them apart."""
+        for digits in range(4, 18):
+            told = [show(value, self.unit, digits) for value in (low, high, *outside)]
+            limits = set(told[:2])
+            if limits.isdisjoint(told[2:]) and len(limits) == len({low, high}):
+                break
+        return told
 
     @property
     def table(self) -> Table:

@@ -51,6 +51,17 @@ def test_what_jumps_and_what_drifts_is_told():
     assert "All lie within, and none drifts." in still.sentences
 
 
+def test_what_lies_outside_is_not_told_as_a_limit():
+    values = [8.6900, 8.6901] * 6
+    found = OverRuns.of("tau", "s", points([*values, 8.69045]))
+    assert found.chart is not None and found.chart.outside == (12,)
+    (usual,) = (text for text in found.sentences if text.startswith("Usual"))
+    told = found.sentences[-1].rpartition(": ")[2].removesuffix(".")
+    assert told not in usual
+    low, high = (float(word) for word in usual.replace(" s", "").split()[2:5:2])
+    assert low < high < float(told.removesuffix(" s"))
+
+
 def test_few_runs_have_a_mean_and_no_limits():
     found = OverRuns.of("tau", "s", points([8.0, 9.0], "AB"))
     assert found.chart is None and "8 runs or more" in found.sentences[-1]
