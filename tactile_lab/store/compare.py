@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +22,7 @@ class Differences:
 
     Attributes:
         environment: versions, computer, bench and how it was simulated.
-        calibration: constants stored with the samples, and changed scene lines.
+        calibration: constants stored with the samples, and changed keys of the scene.
         results: trials, spikes and samples.
     """
 
@@ -93,15 +93,16 @@ def _values(old: dict[str, Any], new: dict[str, Any]) -> Iterator[str]:
 
 
 def _scene(old: Path, new: Path) -> Iterator[str]:
-    """Lines of the resolved scene that differ."""
-    one, other = (_lines(path / SCENE) for path in (old, new))
-    for line in difflib.unified_diff(one, other, "old", "new", lineterm="", n=0):
-        if not line.startswith(("---", "+++", "@@")):
-            yield f"scene {line}"
+    """Keys of the resolved scene that differ, each with its table."""
+    yield from (f"scene {line}" for line in _values(_keys(old), _keys(new)))
 
 
-def _lines(file: Path) -> list[str]:
-    return file.read_text(encoding="utf-8").splitlines() if file.exists() else []
+def _keys(run: Path) -> dict[str, Any]:
+    file = run / SCENE
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    except ValueError as reason:
+        raise RunFolderError(f"{file} cannot be read: {reason}.") from reason
 
 
 def _results(old: Run, new: Run) -> Iterator[str]:

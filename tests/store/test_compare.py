@@ -12,14 +12,20 @@ from tactile_lab.store.recorder import Recorder
 
 @pytest.fixture
 def make(bench, tmp_path):
-    def made(*, seed=1, environment=None, gain=0.2, hold="2 s"):
+    def made(*, seed=1, environment=None, gain=0.2, hold="2 s", deviation="0 V"):
         info = {
             "environment": environment or {"numpy": "2.0"},
             "seed": seed,
             "parameters": {"hold": hold},
         }
         folder = RunFolder.create(tmp_path, "pulses", info)
-        folder.write_text("scene.toml", f'[protocol]\nhold = "{hold}"\n')
+        scene = f"""
+            sensor = {{ V_GS = "1.4 V" }}
+            simulated = {{ deviation = {{ V_GS = "{deviation}" }} }}
+            [protocol]
+            hold = "{hold}"
+        """
+        folder.write_text("scene.toml", scene)
         layout = Layout(
             signals=bench.SIGNALS,
             detection=bench.DETECTION,
@@ -46,9 +52,16 @@ def test_each_kind_of_difference_is_named(make):
     assert "numpy was 2.0, is 2.1" in found.environment
     assert "seed was 1, is 2" in found.environment
     assert "newtons_per_ampere was 0.2, is 0.1" in found.calibration
-    assert 'scene +hold = "3 s"' in found.calibration
+    assert "scene protocol.hold was 2 s, is 3 s" in found.calibration
     assert "the samples of V_K are not identical" in found.results
     assert any("spike times differ by up to" in line for line in found.results)
+
+
+def test_a_key_of_the_scene_is_named_with_its_table(make):
+    """Of the V_GS that is believed and the one that the simulated world deviates by."""
+    found = differences(make(), make(deviation="3 mV"))
+    (line,) = (line for line in found.calibration if line.startswith("scene"))
+    assert line == "scene simulated.deviation.V_GS was 0 V, is 3 mV"
 
 
 def test_on_the_command_line_values_stand_side_by_side(make, tmp_path):
