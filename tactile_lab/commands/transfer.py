@@ -37,6 +37,7 @@ def command(
     with refusing():
         from tactile_lab.analysis.transfer import fit_transfer
         from tactile_lab.analysis.transfer_file import read_transfer
+        from tactile_lab.model.temperature import VOLT_PER_KELVIN
         from tactile_lab.quantity import parse, show
 
         limits = None
@@ -69,15 +70,22 @@ def command(
                 "lines_left_out": list(read.left_out),
                 "between_V": list(fit.range),
                 "scatter": fit.scatter,
+                "V_T_V": fit.V_T,
             }
         )
         return
     for name, estimate, unit in (
         ("I_S", fit.I_S, "A"),
         ("m", fit.m, ""),
-        ("swing", fit.swing, "V"),
+        ("swing", fit.swing, "V/decade"),
     ):
         interval = f"{show(estimate.low, unit)} to {show(estimate.high, unit)}"
         say(f"{name:6} {show(estimate.value, unit)}  ({interval}, 95 %)")
     low, high = fit.range
     say(f"from {fit.points} points between {low:g} V and {high:g} V")
+    kelvin = fit.V_T / VOLT_PER_KELVIN
+    say(
+        f"m is for V_T = {show(fit.V_T, 'V')}, Table 1's, which is {kelvin:.1f} K; at "
+        "another temperature it is as many times smaller as V_T is larger. Swing and "
+        "I_S rest on no V_T."
+    )

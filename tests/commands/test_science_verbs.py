@@ -119,6 +119,10 @@ def test_transfer_fits_a_csv(tmp_path):
     assert found["m"]["value"] == pytest.approx(5.646)
     said = call("transfer", path, "--between", "1 V", "2 V").stdout
     assert "11 points between 1 V and 2 V" in said
+    # a curve tells m V_T alone: 2 % of m lie between 290 K and 296 K
+    assert "m is for V_T = 25 mV" in said and "290.1 K" in said
+    assert "mV/decade" in said
+    assert found["V_T_V"] == 0.025
     assert call("transfer", path, "--figure", tmp_path / "fig1c").exit_code == 0
     assert (tmp_path / "fig1c.png").read_bytes().startswith(b"\x89PNG")
     lost = call("transfer", path, "--figure", path / "fig1c")  # beneath a file
