@@ -97,7 +97,8 @@ def fit_circuit_adaptation(
 
     if circuit.saturation:
         raise NotIdentifiableError("T1 saturates: V_C1 alone does not tell its current")
-    times = within(spike_times, hold) - hold[0]
+    held = within(spike_times, hold)
+    times = held - hold[0]
     number = times.size - 1
     if number < FEWEST_INTERVALS:
         seen = count(max(number, 0), "interval")
@@ -136,7 +137,8 @@ def fit_circuit_adaptation(
         scatter=scatter,
         rms=rms,
         intervals=number,
-        silent_from=None if silent is None else silent + hold[0],
+        # a law without another spike gives the measured one, to the last digit
+        silent_from=None if silent is None else float(held[-1] + (silent - times[-1])),
         hold=hold,
         circuit=circuit,
     )

@@ -52,6 +52,14 @@ def test_a_scatter_that_is_small_by_luck_tells_no_tau():
         fit_circuit_adaptation(Circuit(), spikes + np.cumsum(wobble), (0.1, 0.6))
 
 
+@pytest.mark.parametrize("begin", [0.264, 0.2983, 0.3284])
+def test_a_law_without_another_spike_is_silent_from_the_measured_last_one(begin):
+    """Not from a rounding later, which was told as a law that would fire on."""
+    spikes = held(Circuit(), 0.14)
+    law = fit_circuit_adaptation(Circuit(), spikes, (begin, 10.25))
+    assert law.silent_from == spikes[-1]
+
+
 @pytest.mark.parametrize("tau", [8.69, 6.0])
 def test_it_gives_the_circuit_back_from_the_believed_one(tau):
     circuit = Circuit(tau=tau, V_GS=1.41)
