@@ -25,8 +25,7 @@ def write(events: Events, file: Path) -> None:
     """
     if file.suffix != ENDING:  # else the library ends the whole program
         raise ParameterError(
-            f"AEDAT4 goes into a file that ends in {ENDING}; yours ends in "
-            f'"{file.suffix}".'
+            f"AEDAT4 goes into a file that ends in {ENDING}; let --out end so."
         )
     file.touch()  # the library's own words are a page of C++
     dv = library("dv_processing", "dv-processing")

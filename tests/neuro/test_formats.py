@@ -181,12 +181,14 @@ def test_a_run_without_spikes_says_so(run, monkeypatch):
         events_of(run)
 
 
-def test_aedat4_has_its_ending(skin_folder, tmp_path):
+@pytest.mark.parametrize("name", ["e.dat", "e"])
+def test_aedat4_has_its_ending(skin_folder, tmp_path, name):
     """Else dv-processing ends the whole program."""
     pytest.importorskip("dv_processing")
     verb = ["-m", "tactile_lab", "export", skin_folder, "--to", "aedat4"]
-    command = [sys.executable, *verb, "--out", tmp_path / "e.dat"]
+    command = [sys.executable, *verb, "--out", tmp_path / name]
     done = subprocess.run(command, check=False, capture_output=True)
     assert done.returncode == 2
-    assert b'ends in ".dat"' in done.stderr
+    assert b"ends in .aedat4; let --out end so." in done.stderr
+    assert b".part" not in done.stderr  # the name it has until it is whole
     assert not list(tmp_path.iterdir())
