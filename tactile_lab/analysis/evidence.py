@@ -150,6 +150,11 @@ class Residuals:
         return np.concatenate([[False], shared])[: self._later.size]
 
 
+def factor_of(run: int) -> str:
+    """What the factor of a run's force is called; the first run is 1."""
+    return f"force_{run}"
+
+
 class JointResiduals:
     """Residuals of one or several runs as a function of what they share.
 
@@ -170,7 +175,7 @@ class JointResiduals:
         self._runs = runs
         self._shared = runs[0].names
         self._scaled = scaled
-        factors = (f"force_{i}" for i in range(1, len(runs) + 1))
+        factors = (factor_of(i) for i in range(1, len(runs) + 1))
         self.names = (*self._shared, *(factors if scaled else ()))
         causes = dict.fromkeys(cause for run in runs for cause in run.causes)
         shifted = any(run.bins and run.offset for run in runs)

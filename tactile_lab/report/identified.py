@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.analysis.evidence import factor_of
 from tactile_lab.analysis.identify import Evidence, Identified, identify_together
 from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import DrivenCircuit
@@ -69,7 +70,8 @@ def identify_runs(
     Args:
         runs: at least one.
         names: parameters of `Circuit` to fit.
-        force_scales: fit a factor of each run's force as well, "force_1" and so on.
+        force_scales: fit a factor of each run's force as well, "force_1" and so on;
+            alone too, by the same name.
 
     Raises:
         NotIdentifiableError: a run has neither V_C1 nor spikes, or they do not
@@ -82,16 +84,20 @@ def identify_runs(
             f"{twice[0]} is named twice; its evidence would count twice. Name it once."
         )
     seen = [_evidence(run, names) for run in runs]
-    # a factor that is fitted is not held by what was believed of the force
-    open_ = {"force"} if force_scales else set()
-    joint = [replace(s, causes=[c for c in s.causes if c not in open_]) for s in seen]
-    together = identify_together(joint, names, force_scales=force_scales)
+    if force_scales:
+        # a factor that is fitted is not held by what was believed of the force
+        seen = [replace(s, causes=[c for c in s.causes if c != "force"]) for s in seen]
+    together = identify_together(seen, names, force_scales=force_scales)
     alone: dict[str, Identified | None] = {}
-    for run, one in zip(runs, seen, strict=True):
+    for i, (run, one) in enumerate(zip(runs, seen, strict=True), start=1):
         try:
-            alone[run.run] = identify_together([one], names)
+            own = identify_together([one], names, force_scales=force_scales)
         except NotIdentifiableError:
             alone[run.run] = None
+            continue
+        called = {factor_of(1): factor_of(i)}
+        estimates = {called.get(n, n): value for n, value in own.estimates.items()}
+        alone[run.run] = replace(own, estimates=estimates)
     return FittedRuns(together=together, alone=alone)
 
 

@@ -95,6 +95,25 @@ def test_a_factor_of_the_force_is_not_held_by_what_was_believed_of_it():
     assert found.estimates["force_1"].half < 1e-3
 
 
+def test_runs_whose_forces_err_differently_share_a_value_with_factors():
+    """Alone too the factor is fitted, by the name that it has among all."""
+
+    def pressed(name, factor):
+        sensor = Circuit(g31=factor * Circuit().g31, V_GS=1.402)
+        run = modelled("pulses", [pulse(0.15), pulse(0.18)], circuit=sensor)
+        return replace(run, run=name, belief=replace(run.belief, circuit=Circuit()))
+
+    found = identify_runs(
+        [pressed("S1", 1.02), pressed("S2", 0.97)], ("V_GS",), force_scales=True
+    )
+    assert found.warnings == ()
+    for run, name, factor in (("S1", "force_1", 1.02), ("S2", "force_2", 0.97)):
+        alone = found.alone[run].estimates
+        assert list(alone) == ["V_GS", name]
+        assert alone["V_GS"].value == pytest.approx(1.402, abs=2e-4)
+        assert alone[name].value == pytest.approx(factor, abs=2e-3)
+
+
 def test_identification_leaves_out_the_field_s_lag(rate_force):
     steps = np.array([1.0, 1.0, 2.0, 2.0])
     force = Waveform(np.r_[0.0, steps, 3.0], np.array([0, 0, 0.1, 0.1, 0, 0]))
