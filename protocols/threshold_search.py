@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from tactile_lab.analysis.estimate import student_95
 from tactile_lab.analysis.rate_force import Bracket, onset
 from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
 from tactile_lab.errors import LimitError, NotIdentifiableError
@@ -23,6 +25,8 @@ from tactile_lab.waveform import Waveform
 
 PushForce = Annotated[float, Unit("N", least=0.0)]
 Resolution = Annotated[float, Unit("N", above=0.0)]
+TOLD = 1e-3
+"""Part of V_fire by which it has to scatter to be told."""
 
 
 class ThresholdSearch(Recovering):
@@ -221,10 +225,12 @@ def _gate(run: Measurement, found: Bracket, force_error: float) -> Conclusion:
         _applied(run, next(t for t in run.results if t.level == level))
         for level in (found.silent, found.fires)
     )
+    fire, noise = run.circuit.fire_voltage, _scatter_of_V_fire(run)
+    displaced = list(run.displaced.values())
+    if noise:
+        displaced.append(replace(run.circuit, V_fire=fire + noise))
     try:
-        low, high = V_GS_of_onset(
-            run.circuit, silent, fires, force_error, run.displaced.values()
-        )
+        low, high = V_GS_of_onset(run.circuit, silent, fires, force_error, displaced)
     except NotIdentifiableError as reason:
         return Conclusion((f"No V_GS explains the critical force: {reason}.",))
     said = (
@@ -233,7 +239,40 @@ def _gate(run: Measurement, found: Bracket, force_error: float) -> Conclusion:
         "parameters as believed) explains it; "
         f"{show(run.circuit.V_GS, 'V', 5)} is believed."
     )
+    if noise > TOLD * fire:
+        said += (
+            f" V_fire scatters by ±{show(noise, 'V', 2)} (95 %) from spike to spike, "
+            "as the intervals in the holds tell; that is in it."
+        )
     return Conclusion((said,), {"V_GS_low_V": low, "V_GS_high_V": high})
+
+
+def _scatter_of_V_fire(run: Measurement) -> float:
+    """How far V_fire of a single press may lie from its mean, V (95 %).
+
+    From the intervals within the holds; 0 where they are too few to tell.
+    """
+    from tactile_lab.analysis.circuit_adaptation import FOLLOWED
+    from tactile_lab.analysis.evidence import LONGEST
+    from tactile_lab.analysis.identify import identify
+
+    circuit, spikes = run.circuit, run.spike_times
+    held = np.zeros(spikes.size, dtype=np.bool_)
+    for trial in run.results:
+        begin = run.applied_edge(trial)
+        if trial.hold is not None and begin is not None and not trial.uncounted:
+            end = trial.start + trial.hold[1]
+            held |= (spikes >= begin + FOLLOWED) & (spikes <= end)
+    freedom = int(np.count_nonzero(np.diff(spikes[held]) <= LONGEST)) - 1
+    if circuit is None or freedom < 1:
+        return 0.0
+    try:
+        found = identify(
+            circuit, ("V_GS",), run.force, run.duration, spike_times=spikes[held]
+        )
+    except NotIdentifiableError:
+        return 0.0
+    return student_95(freedom) * (found.scatter_V_fire or 0.0)
 
 
 def _applied(run: Measurement, trial: MeasuredTrial) -> Waveform:

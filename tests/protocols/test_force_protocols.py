@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from modelled_runs import modelled, pulse, recovery
 from pydantic import ValidationError
 
 from protocols.bipolar import Bipolar
@@ -284,6 +285,25 @@ def test_threshold_search_carries_the_follower_s_bias_into_V_GS():
     bare = search.conclude(run).values
     bracket = bare["V_GS_high_V"] - bare["V_GS_low_V"]
     assert high - low == pytest.approx(math.hypot(bracket, 1e-3), rel=0.05)
+
+
+def test_threshold_search_carries_the_scatter_of_V_fire_into_V_GS():
+    """A single press fires or not by the V_fire that it happens to meet."""
+    steps = [pulse(0.14), recovery(), pulse(0.0965), recovery(), pulse(0.0975)]
+    run, search = modelled("threshold_search", steps), ThresholdSearch()
+    steady = search.conclude(run)
+    assert "scatters" not in steady.text
+    most = run.trials[0]
+    # half a millisecond of an interval is some 15 mV of V_fire
+    later = np.cumsum(np.random.default_rng(1).normal(0, 5e-4, most.spike_times.size))
+    scattered = replace(most, spike_times=most.spike_times + later)
+    found = search.conclude(replace(run, trials=(scattered, *run.trials[1:])))
+    assert "V_fire scatters by ±" in found.text
+    before, after = (
+        told.values["V_GS_high_V"] - told.values["V_GS_low_V"]
+        for told in (steady, found)
+    )
+    assert after > 1.2 * before
 
 
 @pytest.mark.parametrize(
