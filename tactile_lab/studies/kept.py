@@ -96,6 +96,8 @@ class Kept:
                 # the study's author wrote it, as they write protocols in Python
                 code = _compiled(self.name, self.expression)
                 value = eval(code, dict(names))
+            if isinstance(value, Mapping) and "value" in value:
+                value = value["value"]  # of `answer`: its interval is beside it
             array = np.asarray(value, dtype=np.float64)
         except Exception as error:  # whatever a user's expression raises
             where = self.expression.rpartition(":")[0] if self.source else ""

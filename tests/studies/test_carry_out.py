@@ -169,6 +169,20 @@ def test_the_whole_bench_repeats_with_seeds(tmp_path: Path) -> None:
     assert numbers["noise"][0] != numbers["noise"][1]
 
 
+def test_a_fitted_number_of_the_answer_is_kept_by_its_value(tmp_path: Path) -> None:
+    asked = {
+        "scene": "hold_10s",
+        "set": {"protocol.hold": "2 s", "protocol.rest": "0.2 s"},
+        "on": "simulated",
+        "keep": {"tau": "answer['tau_s']", "least": "answer['tau_s']['low_95']"},
+        "axis": [{"key": "protocol.level", "values": ["180 mN"]}],
+    }
+    found, _ = done(load_study(asked), tmp_path)
+    assert found.failed == 0, found.reasons
+    numbers = found.numbers()
+    assert 0 < numbers["least"] < numbers["tau"] == pytest.approx(8.69, rel=0.05)
+
+
 def test_the_run_of_a_point_is_kept_and_found_again(tmp_path: Path) -> None:
     axis = {"key": "sensor.V_GS", "values": ["1.4 V", "1.41 V"]}
     asked = {**SHORT, "on": "simulated", "keep": ["spike_count"], "axis": [axis]}
