@@ -184,8 +184,8 @@ def _noise(scene: Scene, needed: Needs, streamed: float) -> Iterator[str]:
     if expected > 0.5:
         yield (
             f"noise of {show(sigma, 'V')} on V_K reaches the threshold of "
-            f"{show(threshold, 'V')} about {expected:.3g} times and adds "
-            "spikes. Raise the threshold."
+            f"{show(threshold, 'V')} about {float(f'{expected:.2g}'):,.12g} times "
+            "and adds spikes. Raise the threshold."
         )
 
 

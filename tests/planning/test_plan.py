@@ -108,6 +108,7 @@ def test_a_rate_that_misses_spikes_is_warned_of():
 
 def test_noise_above_the_threshold_is_warned_of():
     assert "adds spikes" in warned("simulated.noise.V_K=200 mV")
+    assert "about 7,700 times" in warned("simulated.noise.V_K=150 mV")
     assert "adds spikes" not in warned("simulated.noise.V_K=20 mV")
 
 
