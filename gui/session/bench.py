@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, Signal
 from gui.session.log import Log, Severity
 from gui.session.status import UNKNOWN, Status
 from gui.state import WindowState
+from tactile_lab.bench import OffReport
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.jobs import (
     Checked,
@@ -69,7 +70,7 @@ class ConnectedBench(QObject):
         super().__init__()
         self._link, self._status, self._log, self._free = link, status, log, free
         self._answered: float | None = None
-        self._looking = False
+        self._looking = self._switching = False
         status.faulted.connect(self._doubt)
         self.choice: str | None = None
         self.spec: BenchSpec | None = None
@@ -103,6 +104,18 @@ class ConnectedBench(QObject):
             self._looking, self.field = False, None
             self._status.enter(WindowState.CONNECTING)
             self._link.ask(self._checked, check_bench, self.request)
+
+    def switch_off(self) -> None:
+        """Have the coil switched off where no state waits for it, as at a fault.
+
+        Asked again before it has answered, once is enough.
+        """
+        asked = self.request
+        if asked is not None and not self._switching:
+            self._switching = True
+            self._link.ask(
+                lambda reply: self._switched_off(reply, asked), check_bench, asked
+            )
 
     def look(self) -> None:
         """Ask who is still there, between runs; what is gone becomes a fault.
@@ -209,6 +222,22 @@ class ConnectedBench(QObject):
         self.answers, self._answered = found.found, time.monotonic()
         self.found = found if found.sound else None
         self._status.coil.left(found.off)
+
+    def _switched_off(self, reply: Reply[Checked], asked: Request) -> None:
+        """Take what is now known of the coil alone: others are asked by `check`."""
+        self._switching = False
+        if reply.lost:
+            self._status.lose_engine()
+        elif asked is self.request:
+            found, why = reply.value, [reply.problem]
+            if found is not None:
+                why = [one.problem for one in found.found if one.role == "coil"]
+            off = found.off if found is not None else None
+            off = off or OffReport(False, None, " ".join(("Not verified off.", *why)))
+            level = Severity.GOOD if off.verified else Severity.ERROR
+            self._status.coil.left(off)
+            self._log.add(level, "safety", f"Coil: {off.text}", safety=True)
+            self._status.changed.emit()
 
     def _checked(self, reply: Reply[Checked]) -> None:
         status, found = self._status, reply.value

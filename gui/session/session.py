@@ -258,6 +258,10 @@ class Session(QObject):
         elif self.state is WindowState.READY and self.bench.request is not None:
             self._log_stop("Coil off sent again")
             self.bench.check()
+        elif self.state in (WindowState.FAULT, WindowState.DISCONNECTED):
+            if self.status.coil.limits is not None:
+                self._log_stop("Coil off sent again", Severity.WARNING)
+                self.bench.switch_off()
         self.queue.hold()
 
     def acknowledge(self) -> None:

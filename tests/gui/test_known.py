@@ -68,6 +68,10 @@ def until(session: Session, done: Callable[[], object]) -> None:
         time.sleep(0.005)
 
 
+def coil(session: Session) -> CoilKnowledge:
+    return truth(session.state, session.coil_view())
+
+
 def lamps(session: Session) -> list[Lamp]:
     return [view.lamp for view in session.snapshot().instruments]
 
@@ -122,6 +126,40 @@ def test_an_output_that_is_switched_on_by_hand_is_told_and_left_on(
     assert not source.output, "connecting again makes it safe"
 
 
+def test_stop_switches_off_what_a_fault_found_on(
+    served: Session, source: Source
+) -> None:
+    """It did nothing at a fault, while 300 mA flowed and the source answered."""
+    with serial_for_url(source.served.addresses["coil"]) as by_hand:
+        by_hand.write(b"CURR 0.3\nOUTP 1\n")
+        while not source.output:
+            time.sleep(0.005)
+    served.bench.look()
+    until(served, lambda: served.state is WindowState.FAULT)
+    served.stop()
+    until(served, lambda: coil(served) is CoilKnowledge.OFF)
+    assert not source.output
+    assert served.state is WindowState.FAULT, "which a person has yet to read"
+
+
+@pytest.mark.parametrize("state", [WindowState.FAULT, WindowState.DISCONNECTED])
+def test_stop_asks_a_source_that_did_not_answer_again(
+    served: Session, source: Source, state: WindowState
+) -> None:
+    source.served.close()
+    served.bench.check()
+    until(served, lambda: served.state is WindowState.FAULT)
+    if state is WindowState.DISCONNECTED:
+        served.acknowledge()
+    assert coil(served) is CoilKnowledge.UNKNOWN
+    said = len(served.log.lines)
+    served.stop()
+    until(served, lambda: len(served.log.lines) == said + 2)
+    asked, told = served.log.lines[said:]
+    assert "Coil off sent" in asked.text and "Not verified off" in told.text
+    assert served.state is state and coil(served) is CoilKnowledge.UNKNOWN
+
+
 def test_a_coil_that_could_not_be_looked_at_is_not_called_off(
     served: Session, source: Source
 ) -> None:
@@ -129,8 +167,7 @@ def test_a_coil_that_could_not_be_looked_at_is_not_called_off(
     source.bench.write_text("broken")
     served.stop()
     until(served, lambda: served.state is WindowState.FAULT)
-    known = truth(served.state, served.coil_view())
-    assert known is CoilKnowledge.UNKNOWN
+    assert coil(served) is CoilKnowledge.UNKNOWN
 
 
 def test_a_run_that_begins_during_a_look_waits_for_its_end(
