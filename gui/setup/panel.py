@@ -102,7 +102,7 @@ class SetupPanel(QFrame):
         self.tables.changed.connect(self._form_changed)
         session.bench.ready.connect(self.subject.follow_bench)
         self.subject.changed.connect(self._show_subject)
-        self.star.failed.connect(self._show_problem)
+        self.star.failed.connect(lambda words: say(self.problem, words))
         buttons.run.clicked.connect(self.start)
         buttons.queue.clicked.connect(self.enqueue)
         buttons.save.clicked.connect(self.save)

@@ -47,6 +47,20 @@ def test_star_keeps_marks_and_takes_up_parameters(lab) -> None:
     setup.plan_now()
 
 
+def test_what_a_preset_cannot_do_leaves_the_form_as_it_is(lab) -> None:
+    """Its plan was taken away, and Run did nothing, without a word."""
+    setup, plan = lab.window.setup, lab.session.plan
+    expectation = plan.expectation
+    assert expectation is not None and setup.run.isEnabled()
+    setup.star.save("../nowhere")
+    assert "cannot be called" in setup.problem.text()
+    assert not plan.problem and plan.expectation is expectation
+    setup.run.click()
+    assert lab.session.busy
+    lab.session.stop("test is over")
+    lab.until(lambda: not lab.session.busy)
+
+
 def test_unusable_preset_is_told_and_not_taken_up(lab) -> None:
     setup = lab.window.setup
     before = setup.form.texts()
