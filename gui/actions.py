@@ -107,6 +107,7 @@ class Actions(QObject):
         super().__init__(window)
         self.window, self.panels, self.screen = window, panels, screen
         self.runs, self.preferences = runs, preferences
+        self._closing = closing
         self._grabbed = 1
         self.keys = self._all()
         self.bind(window)
@@ -136,6 +137,8 @@ class Actions(QObject):
                 shortcut.activated.connect(partial(self._act, key, keys))
 
     def _act(self, key: Shortcut, pressed: str) -> None:
+        if self._closing.isVisible():  # what a key opens would lie above the question
+            return
         if self._card() is None or pressed not in BELOW_CARDS:
             key.act()
 

@@ -2,9 +2,10 @@
 
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QFileDialog
+from PySide6.QtWidgets import QDialog, QFileDialog
 
 from gui.ask_file import ask_file
+from gui.dialogs.overlay import Overlay
 from gui.look.theme import Theme
 from gui.session.queue import Queued
 from gui.session.session import Session
@@ -105,4 +106,19 @@ def test_the_question_is_not_covered_by_a_dialog(lab, tmp_path) -> None:
     assert not window.close()
     assert not dialog.isVisible() and window.closing.isVisible()
     lab.until(window.closing.keep.hasFocus)
+    window.closing.keep.click()
+
+
+def test_no_key_covers_the_question(lab) -> None:
+    """Ctrl+E opened a file dialog over it, and Esc there answered the question below."""
+    window = lab.window
+    lab.run()
+    assert not window.close()
+    lab.until(window.closing.keep.hasFocus)
+    for key in (Qt.Key.Key_E, Qt.Key.Key_K, Qt.Key.Key_O):
+        QTest.keyClick(window.closing.keep, key, Qt.KeyboardModifier.ControlModifier)
+        lab.app.processEvents()
+    over = [w for w in lab.app.topLevelWidgets() if isinstance(w, QDialog)]
+    over += [card for card in window.findChildren(Overlay) if card.isVisible()]
+    assert [one for one in over if one.isVisible()] == [window.closing]
     window.closing.keep.click()
