@@ -96,8 +96,8 @@ def main(
     with collected_here():
         app.exec()
         session.close()
-    left, unknown = session.coil_view(), session.status.coil.left_unknown
-    return 4 if unknown or (left is not None and left.verified_off is False) else 0
+    coil = session.status.coil
+    return 4 if coil.left_unknown or coil.doubtful else 0
 
 
 def show_skin(path: Path, out: Path, theme: str) -> None:

@@ -5,6 +5,10 @@ import os
 import subprocess
 import sys
 
+from benches import SERVED
+
+ROW = "kepco-bop"
+
 STARTED = """
 import gc, json, linecache, sys
 from pathlib import Path
@@ -59,6 +63,47 @@ def test_the_bench_is_asked_while_the_window_is_built(tmp_path):
     assert told["loaded ahead"], "numpy would load it in a frame, at a step's end"
     assert told["log"][0].startswith("Asking the instruments of")
     assert told["sources read"] == [] and told["code"] == 0
+
+
+IN_DOUBT = """
+import sys
+from pathlib import Path
+
+def watched(window, *rest):
+    session, timer = window.session, QTimer(window)
+    begin(window, *rest)
+
+    def look():
+        if session.state is WindowState.FAULT:
+            timer.stop()
+            print(window.header.stop.words.title)
+            window.close()
+
+    timer.timeout.connect(look)
+    timer.start(5)
+
+if __name__ == "__main__":  # the engine loads this file, too
+    from PySide6.QtCore import QTimer
+    import gui.app as app
+    from gui.state import WindowState
+
+    begin, app.begin = app.begin, watched
+    sys.exit(app.main("demo", out=Path(sys.argv[1]), bench=sys.argv[2]))
+"""
+
+
+def test_the_exit_code_tells_of_a_coil_that_is_in_doubt(tmp_path):
+    """It was 0 where a source had not answered, which STOP called unknown."""
+    script, bench = tmp_path / "in_doubt.py", tmp_path / "bench.toml"
+    script.write_text(IN_DOUBT)
+    bench.write_text(SERVED.format(port=tmp_path / "gone").replace("patient.toml", ROW))
+    alone = {"QT_QPA_PLATFORM": "offscreen", "XDG_CONFIG_HOME": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, script, tmp_path / "runs", bench],
+        env=os.environ | alone, capture_output=True, text=True, timeout=240,
+    )  # fmt: skip
+    assert done.stdout == "COIL STATE UNKNOWN\n", done.stderr
+    assert done.returncode == 4
 
 
 LEFT = """
