@@ -340,9 +340,10 @@ def _range(values: list[FloatArray], whole: bool) -> list[float]:
     low, high = float(found.min()), float(found.max())
     if whole:
         return [low - 0.5, high + 0.5]
-    # one value, but for rounding, stands in a range of a tenth of it
-    share = 0.1 if high - low <= 1e-6 * abs(high) else 0.0
-    return [*nice_range(low, high, max(1e-9, share * abs(high)))]
+    # one value, but for rounding, stands in a range of a tenth of it; 0 has no tenth
+    one = high - low <= 1e-6 * abs(high)
+    least = (0.1 * abs(high) or 1.0) if one else 0.0
+    return [*nice_range(low, high, max(1e-9, least))]
 
 
 def _pieces(x: FloatArray, y: FloatArray) -> Iterator[slice]:

@@ -93,6 +93,14 @@ def test_one_value_but_for_rounding_has_an_axis_that_can_be_read(app) -> None:
     assert 10 < right - left < 30 and left < 160 < right
 
 
+def test_values_that_are_all_zero_have_an_axis_that_can_be_read(app) -> None:
+    """No spike at any point of a study: its range was a nanohertz, without a number."""
+    view = SmallPlot(Theme("light"))
+    view.show_plot(rates(0.0))
+    low, high = view.panels[0].box.whole[1]
+    assert high - low >= 1 and low < 0 < high
+
+
 def test_what_is_near_its_other_limit_has_air_about_it(app) -> None:
     """Three rates about 15 Hz above 0: their dots stood half cut at the upper edge."""
     line = Series(x=(1.0, 2.0, 3.0), y=[15.2, 15.4, 15.2])
