@@ -83,9 +83,17 @@ class GearMenu(QMenu):
         self._add("Quit", "Ctrl+Q")
 
     def open_below(self, header: Header) -> None:
-        """Open it at its button, below all of the header: STOP stays whole."""
-        left = header.menu_button.mapTo(header, QPoint()).x()
-        self.popup(header.mapToGlobal(QPoint(left, header.height())))
+        """Open it at its button, below all of the header: STOP stays whole.
+
+        Where the screen is too low for that, Qt moves it up: it is left of STOP then.
+        """
+        place = header.menu_button.mapToGlobal(QPoint())
+        place.setY(header.mapToGlobal(QPoint(0, header.height())).y())
+        size, screen = self.sizeHint(), self.screen().availableGeometry()
+        if place.y() + size.height() > screen.bottom():
+            stop = header.stop.mapToGlobal(QPoint()).x()
+            place.setX(max(screen.left(), min(place.x(), stop - size.width())))
+        self.popup(place)
 
     def _add(self, words: str, keys: str = "") -> None:
         # a tab parts the keys; the window has the shortcuts, the menu only names them

@@ -163,7 +163,8 @@ QHeaderView::section { background: transparent; border: 0;
 QListView { background: transparent; border: 2px solid transparent;
   border-radius: 6px; outline: 0; }
 QListView:focus { border-color: $accent; }
-QMenu { background: $panel; border: 1px solid $border_strong; padding: 5px; }
+QMenu { background: $panel; border: 1px solid $border_strong; padding: 5px;
+  menu-scrollable: 1; }
 QMenu::item { padding: 6px 22px; border-radius: 4px; }
 QMenu::item:selected { background: $selected; color: $selected_text; }
 QMenu::item:disabled { color: $faint; }

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QSettings, Qt
+from PySide6.QtCore import QEvent, QPoint, QRect, QSettings, Qt
 from PySide6.QtGui import QHelpEvent, QKeySequence, QShortcut
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QToolTip
@@ -86,6 +86,34 @@ def test_the_menu_leaves_stop_uncovered(lab) -> None:
     assert menu.isVisible()
     assert menu.geometry().top() > stop.mapToGlobal(stop.rect().bottomLeft()).y()
     menu.close()
+
+
+def test_a_menu_that_is_higher_than_the_screen_stays_one_column(lab) -> None:
+    """At 860 x 540 it had two, and covered STOP with the second."""
+    menu = QMenu(lab.window)
+    for number in range(60):
+        menu.addAction(f"entry {number}")
+    menu.popup(lab.window.mapToGlobal(QPoint()))
+    assert menu.sizeHint().height() >= menu.height()
+    assert {menu.actionGeometry(one).left() for one in menu.actions()} == {
+        menu.actionGeometry(menu.actions()[0]).left()
+    }
+    menu.close()
+    menu.deleteLater()
+
+
+def test_the_menu_leaves_stop_uncovered_where_the_screen_is_low(lab) -> None:
+    header, before = lab.window.header, lab.window.geometry()
+    lab.window.resize(860, 500)
+    lab.window.move(0, lab.window.screen().availableGeometry().bottom() - 300)
+    lab.app.processEvents()
+    lab.window.actions_.show_menu()
+    menu = lab.window.findChild(GearMenu)
+    stop = QRect(header.stop.mapToGlobal(QPoint()), header.stop.size())
+    covered = menu.geometry().intersects(stop)
+    menu.close()
+    lab.window.setGeometry(before)
+    assert not covered
 
 
 def test_a_folder_that_the_command_line_names_wins(lab, kept: QSettings) -> None:
