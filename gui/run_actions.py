@@ -74,6 +74,7 @@ class RunActions(QObject):
             add_note(folder, text, at)
         except TactileLabError as error:
             self._screen.say(f"The note was not kept: {error}")
+            self._panels.centre.log.note.setText(text)
             return
         where = "" if at is None else f" at cursor A, {at:.3f} s"
         session.log.add(Severity.NOTE, "note", f"{text} ({folder.name}{where})")

@@ -156,5 +156,5 @@ class LogView(QWidget):
     def _noted(self) -> None:
         text = self.note.text().strip()
         if text:
+            self.note.clear()  # first: what cannot be kept is put back
             self.noted.emit(text)
-            self.note.clear()

@@ -110,7 +110,7 @@ def test_the_question_is_not_covered_by_a_dialog(lab, tmp_path) -> None:
 
 
 def test_no_key_covers_the_question(lab) -> None:
-    """Ctrl+E opened a file dialog over it, and Esc there answered the question below."""
+    """Ctrl+E opened a file dialog over it; Esc there answered the question below."""
     window = lab.window
     lab.run()
     assert not window.close()

@@ -11,7 +11,7 @@ from PySide6.QtTest import QTest
 from gui.dialogs.saving import picture
 from gui.state import WindowState
 from tactile_lab.engine import jobs
-from tactile_lab.store.remarks import add_note, read_remarks
+from tactile_lab.store.remarks import REMARKS, add_note, read_remarks
 from tactile_lab.store.run import Run
 
 
@@ -104,6 +104,24 @@ def test_a_note_beside_an_old_run_is_kept_with_that_run(lab) -> None:
 
     lab.until(found)
     entries.search.clear()
+
+
+def test_a_note_that_cannot_be_kept_stays_in_its_field(lab) -> None:
+    """Of a full disk it was told that the note was not kept, and its words were gone."""
+    window, folder = lab.window, lab.runs(1)[0]
+    window.screen_.open_run(folder)
+    lab.until(lambda: lab.session.opened == (folder.name,))
+    remarks, aside = folder / REMARKS, folder / "aside"
+    if remarks.exists():
+        remarks.rename(aside)
+    remarks.mkdir()
+    type_note(lab, "before the lamp")
+    remarks.rmdir()
+    if aside.exists():
+        aside.rename(remarks)
+    assert "not kept" in last_line(lab)
+    assert window.centre.log.note.text() == "before the lamp"
+    window.centre.log.note.clear()
 
 
 def test_a_report_is_written_again_for_what_is_noted_after_it(lab, monkeypatch) -> None:
