@@ -33,7 +33,6 @@ from gui.preferences import Preferences
 from gui.run_actions import RunActions
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
-from gui.session.log import Severity
 from gui.stop_anywhere import StopAnywhere
 from gui.tab_order import enter_next, scroll
 from tactile_lab.engine.threads import start
@@ -120,7 +119,7 @@ class Actions(QObject):
         stop = StopAnywhere(window, panels.stops, closing, panels.session, once)
         self._is_held = stop.keys.is_held
         self._skin_read.connect(self._show_skin)
-        self._skin_failed.connect(self._say_skin)
+        self._skin_failed.connect(screen.say)
         panels.header.help_asked.connect(lambda: self.show_help())
         for part, button, _ in self._helped:
             button.clicked.connect(
@@ -321,7 +320,7 @@ class Actions(QObject):
         ask_file(self.window, "Open a skin", self.open_skin, kinds=kinds)
 
     def open_skin(self, path: Path) -> None:
-        """Compute an array, or play its events; what prevents it is told in the log."""
+        """Compute an array, or play its events; above the lanes: what prevents it."""
         out = self.panels.session.out.parent / "skins"
 
         def work() -> None:  # STOP would wait for it in the window's thread
@@ -336,9 +335,6 @@ class Actions(QObject):
 
     def _show_skin(self, made: Callable[[Theme, QWidget], QWidget]) -> None:
         made(self.panels.theme, self.window).show()
-
-    def _say_skin(self, why: str) -> None:
-        self.panels.session.log.add(Severity.ERROR, "skin", why)
 
     def show_studies(self) -> None:
         """Show the studies beside the runs, and those among them."""

@@ -107,7 +107,7 @@ def test_a_note_beside_an_old_run_is_kept_with_that_run(lab) -> None:
 
 
 def test_a_note_that_cannot_be_kept_stays_in_its_field(lab) -> None:
-    """Of a full disk it was told that the note was not kept, and its words were gone."""
+    """At a full disk it was told as not kept, and its words were gone."""
     window, folder = lab.window, lab.runs(1)[0]
     window.screen_.open_run(folder)
     lab.until(lambda: lab.session.opened == (folder.name,))

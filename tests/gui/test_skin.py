@@ -183,6 +183,8 @@ def test_the_menu_opens_it_and_tells_what_prevents_it(lab, folder, tmp_path):
     dialog.close()
     actions.open_skin(tmp_path / "none.toml")
     lab.until(lambda: "does not exist" in lab.session.log.lines[-1].text)
+    notice = lab.window.centre.notice
+    assert notice.isVisible(), "a low window shows no log, and nothing happened there"
 
 
 def test_stop_does_not_wait_while_a_skin_is_read(lab, folder, monkeypatch):
