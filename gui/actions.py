@@ -35,6 +35,7 @@ from gui.screen.panels import Panels
 from gui.screen.screen import Screen
 from gui.stop_anywhere import StopAnywhere
 from gui.tab_order import enter_next, scroll
+from gui.within_reach import fit
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import TactileLabError
 
@@ -334,7 +335,9 @@ class Actions(QObject):
         start(work, "open skin", finishes=True)
 
     def _show_skin(self, made: Callable[[Theme, QWidget], QWidget]) -> None:
-        made(self.panels.theme, self.window).show()
+        window = made(self.panels.theme, self.window)
+        fit(window, self.window.screen().availableSize())
+        window.show()
 
     def show_studies(self) -> None:
         """Show the studies beside the runs, and those among them."""

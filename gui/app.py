@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSettings, QSize, QTimer
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtCore import QSettings, QTimer
+from PySide6.QtWidgets import QApplication
 
 from gui import bindings as _first  # noqa: F401
 from gui.garbage import collected_here
@@ -19,7 +19,7 @@ from gui.look.theme import Theme
 from gui.preferences import Preferences
 from gui.session.session import Session
 from gui.tool_tips import ToolTips
-from gui.within_reach import WithinReach
+from gui.within_reach import WithinReach, fit
 from tactile_lab.engine.memory import map_large, share_heap
 from tactile_lab.engine.process import SECOND, take_place
 from tactile_lab.engine.threads import start
@@ -27,9 +27,6 @@ from tactile_lab.engine.threads import start
 if TYPE_CHECKING:
     from gui.window import Window
     from tactile_lab.lab import Lab
-
-FRAME = QSize(8, 40)
-"""Room for what the desktop draws around the window, px."""
 
 
 def application(arguments: Sequence[str] = ()) -> QApplication:
@@ -122,16 +119,6 @@ def show_skin(path: Path, out: Path, theme: str) -> None:
     _close_on_signals(window.close)
     with collected_here():
         app.exec()
-
-
-def fit(window: QWidget, available: QSize) -> None:
-    """Make a window as small as the room on a screen, with its frame, needs it to be.
-
-    Args:
-        window: not yet shown.
-        available: room on the screen, px as the window counts them.
-    """
-    window.resize(window.size().boundedTo(available - FRAME))
 
 
 def begin(window: Window, target: str | None, bench: str | None) -> None:

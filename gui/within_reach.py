@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QObject, QRect, Qt, QTimer
+from PySide6.QtCore import QObject, QRect, QSize, Qt, QTimer
 from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QApplication, QWidget
 
@@ -14,6 +14,9 @@ them first, ms."""
 
 HIDDEN = 16
 """How much of a window's edge may lie outside: some desktops count its shadow, px."""
+
+FRAME = QSize(8, 40)
+"""Room for what the desktop draws around the window, px."""
 
 
 class WithinReach(QObject):
@@ -43,6 +46,16 @@ class WithinReach(QObject):
                 Qt.WindowType.Dialog,
             ):
                 bring_back(window, rooms)
+
+
+def fit(window: QWidget, available: QSize) -> None:
+    """Make a window as small as the room on a screen, with its frame, needs it to be.
+
+    Args:
+        window: not yet shown.
+        available: room on the screen, px as the window counts them.
+    """
+    window.resize(window.size().boundedTo(available - FRAME))
 
 
 def bring_back(window: QWidget, rooms: Sequence[QRect]) -> None:

@@ -29,13 +29,14 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QMenu, QWidget
 
-from gui.app import application, begin, fit
+from gui.app import application, begin
 from gui.dialogs.overlay import Overlay
 from gui.garbage import collected_here
 from gui.look.theme import Theme
 from gui.session.log import LogLine
 from gui.session.session import Session
 from gui.window import Window
+from gui.within_reach import fit
 from tactile_lab.engine import link
 from tactile_lab.engine.memory import map_large, share_heap
 from tactile_lab.engine.process import SECOND, take_place

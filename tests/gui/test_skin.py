@@ -199,6 +199,8 @@ def test_stop_does_not_wait_while_a_skin_is_read(lab, folder, monkeypatch):
     lab.window.actions_.open_skin(folder / "ball.toml")
     lab.until(lambda: lab.window.findChildren(SkinWindow))
     for window in lab.window.findChildren(SkinWindow):
+        room = window.screen().availableSize()
+        assert window.size().boundedTo(room) == window.size(), "no part off the screen"
         window.close()
     assert threads and threading.main_thread() not in threads
 

@@ -16,9 +16,9 @@ from PySide6.QtWidgets import (
     QToolButton,
 )
 
-from gui.app import FRAME, fit
 from gui.lanes.live import LiveSource
 from gui.parts import IconButton
+from gui.within_reach import FRAME, fit
 from tactile_lab.engine.jobs import follow_run
 
 
