@@ -13,7 +13,7 @@ from gui.dialogs.overlay import Overlay
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import label, push
-from gui.state import Snapshot, minutes, stop_text
+from gui.state import CoilKnowledge, Snapshot, minutes, stop_text, truth
 
 NAMED, LENGTH = 3, 60
 """How many queued runs and notes are named, and how many letters of each."""
@@ -133,7 +133,10 @@ def _now(snapshot: Snapshot) -> str:
     if snapshot.expected is not None and not snapshot.manual:
         rest = max(0.0, snapshot.expected - snapshot.elapsed)
         left = f" · remaining {minutes(rest)}"
-    return f"Coil: {stop_text(snapshot.state, snapshot.coil).detail}{left}"
+    text = stop_text(snapshot.state, snapshot.coil)
+    if truth(snapshot.state, snapshot.coil) is CoilKnowledge.UNKNOWN:
+        return f"{text.spoken}{left}"
+    return f"Coil: {text.detail}{left}"
 
 
 def _lost(snapshot: Snapshot) -> str:

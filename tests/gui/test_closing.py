@@ -9,7 +9,7 @@ from gui.dialogs.overlay import Overlay
 from gui.look.theme import Theme
 from gui.session.queue import Queued
 from gui.session.session import Session
-from gui.state import CoilKnowledge, WindowState, stop_text
+from gui.state import CoilKnowledge, CoilView, Snapshot, WindowState, stop_text
 from gui.window import Window
 
 
@@ -121,4 +121,14 @@ def test_no_key_covers_the_question(lab) -> None:
     over = [w for w in lab.app.topLevelWidgets() if isinstance(w, QDialog)]
     over += [card for card in window.findChildren(Overlay) if card.isVisible()]
     assert [one for one in over if one.isVisible()] == [window.closing]
+    window.closing.keep.click()
+
+
+def test_the_question_does_not_tell_an_unknown_coil_what_to_do(lab) -> None:
+    """All it said was "Coil: switch off at the source"."""
+    window = lab.window
+    unknown = CoilView(None, limit=2.0)
+    asked = Snapshot(WindowState.RUNNING, coil=unknown, expected=9.0)
+    window.closing.ask(asked, busy=True)
+    assert window.closing.now.text().startswith("COIL STATE UNKNOWN: switch off")
     window.closing.keep.click()
