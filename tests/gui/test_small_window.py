@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gui.app import FRAME
 from gui.dialogs.connect import Connect
 from gui.dialogs.help import Help
 from gui.dialogs.preferring import PreferencesCard
@@ -26,6 +25,7 @@ from gui.record.progress import ProgressStrip
 from gui.screen.centre import EmptyCard
 from gui.screen.compare_bar import CompareBar
 from gui.state import Snapshot
+from gui.within_reach import FRAME
 from tactile_lab.engine.sensor import SensorState
 
 SMALL, USUAL = QSize(853, 480) - FRAME, QSize(1720, 1080)
