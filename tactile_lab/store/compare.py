@@ -83,11 +83,19 @@ def _files(old: dict[str, str], new: dict[str, str]) -> Iterator[str]:
 
 
 def _values(old: dict[str, Any], new: dict[str, Any]) -> Iterator[str]:
-    """Entries that differ; entries within entries by themselves."""
+    """Entries that differ; entries within entries by themselves.
+
+    What only one of the two has is None in the other, as is what was not known.
+    """
     for key in sorted({*old, *new}):
         one, other = old.get(key), new.get(key)
-        if isinstance(one, dict) and isinstance(other, dict):
-            yield from (f"{key}.{line}" for line in _values(one, other))
+        within = [found for found in (one, other) if found is not None]
+        if all(isinstance(found, dict) for found in within):
+            yield from (f"{key}.{line}" for line in _values(one or {}, other or {}))
+        elif one is None:
+            yield f"{key} was not there, is {other}"
+        elif other is None:
+            yield f"{key} was {one}, is not there any more"
         elif one != other:
             yield f"{key} was {one}, is {other}"
 

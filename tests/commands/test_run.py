@@ -83,7 +83,7 @@ def test_a_run_is_repeated_from_its_own_folder(finished, tactile_lab, tmp_path):
     answer = tactile_lab("run", *options, "--set", warmer, "--no-report")
     assert answer.code == 0, answer.err
     assert "results: the same" in answer.out
-    assert "temperature.K was None, is 296.65" in answer.out
+    assert "temperature.K was not there, is 296.65" in answer.out
     assert "loss: 0 of" in tactile_lab("show", *tmp_path.iterdir()).out
     assert "demo" in next(tmp_path.iterdir()).name
 

@@ -64,6 +64,24 @@ def test_a_key_of_the_scene_is_named_with_its_table(make):
     assert line == "scene simulated.deviation.V_GS was 0 V, is 3 mV"
 
 
+def test_what_only_one_of_them_has_was_not_there_or_is_no_more(make):
+    old, new = make(seed=None), make(environment={"scipy": "1.17"})
+    found = differences(old, new)
+    assert "scipy was not there, is 1.17" in found.environment
+    assert "numpy was 2.0, is not there any more" in found.environment
+    assert "seed was not there, is 1" in found.environment
+    assert "None" not in str(found) + str(differences(new, old))
+
+
+def test_entries_of_a_table_that_only_one_of_them_has_are_named(make):
+    old, new = make(), make()
+    kept = (old / "scene.toml").read_text()
+    (old / "scene.toml").write_text(kept.replace("simulated =", "lab ="))
+    found = differences(old, new).calibration
+    assert "scene simulated.deviation.V_GS was not there, is 0 V" in found
+    assert "scene lab.deviation.V_GS was 0 V, is not there any more" in found
+
+
 def test_on_the_command_line_values_stand_side_by_side(make, tmp_path):
     old, new = make(), make(hold="3 s")
     write_json(new / "results.json", {"conclusion": {"critical_force_N": 0.0926}})
