@@ -107,6 +107,7 @@ def describe(path: Path) -> dict[str, Any]:
                     "end_s": float(row["end"]),
                     "spikes": int(row["spikes"]) if searched else None,
                     "uncounted": (why_not or None) if searched else None,
+                    "skipped": int(row["skipped"]),
                     "complete": bool(whole),
                 }
                 for row, whole, why_not in zip(
@@ -157,10 +158,12 @@ def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
         else:  # prepared, and the run ended before it
             times = f"would have begun at {begun} s"
         cut = "" if trial["complete"] else ", cut short"
+        skipped = trial["skipped"]
+        late = f", {count(skipped, 'set-point')} skipped" if skipped else ""
         spikes = trial["spikes"]
         told = "" if spikes is None else f", {count(spikes, 'spike')}"
         told += " seen, not all" if trial["uncounted"] else ""
-        yield "trial", f"{trial['label']:<12} {times}{told}{cut}"
+        yield "trial", f"{trial['label']:<12} {times}{told}{cut}{late}"
     if summary["overrange_blocks"]:
         yield "over range", f"in {summary['overrange_blocks']} blocks"
     if summary["loss"]:

@@ -140,6 +140,7 @@ def test_a_trial_that_the_run_ended_before_is_not_said_to_end_before_it_begins(r
             "end_s": 3.1,
             "spikes": 0,
             "uncounted": None,
+            "skipped": 0,
             "complete": False,
         }
     ]

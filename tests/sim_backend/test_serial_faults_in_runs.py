@@ -10,6 +10,7 @@ from sim_backend.bench import open_bench
 from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.acquisition.ending import Executed
 from tactile_lab.acquisition.events import RunState
+from tactile_lab.commands.show import describe, rows
 from tactile_lab.engine.execution import Execution
 from tactile_lab.planning.needs import needs
 from tactile_lab.report.findings import find
@@ -75,6 +76,10 @@ def test_set_points_that_came_too_late_are_told_and_stored(tmp_path: Path) -> No
     found = find(read(done.folder))
     assert f"120 mN, {skipped} set-point" in trials_table(found.run).rows[0][0]
     assert results(found)["trials"][0]["skipped"] == skipped
+    shown = describe(done.folder)
+    assert shown["trials"][0]["skipped"] == skipped
+    told = next(line for name, line in rows(shown) if name == "trial")
+    assert told.endswith(f", {skipped} set-points skipped")
     log = (done.folder / "log.jsonl").read_text(encoding="utf-8")
     assert "coil set-points came too late and were skipped" in log
     assert "the source answered late" in log and "computer" not in log
