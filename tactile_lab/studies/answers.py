@@ -110,7 +110,7 @@ def _yield(
     values: dict[str, Any],
     missing: list[str],
 ) -> Iterator[Table]:
-    """How many points meet every requirement; one that failed does not.
+    """How many points meet every requirement; a number that failed meets none.
 
     Only of independent draws is the share known to an interval; at each combination
     of values by itself.

@@ -44,7 +44,7 @@ def plots(found: Gathered) -> Iterator[Plot]:
 
 
 def _map(found: Gathered, across: Axis, up: Axis) -> Plot:
-    """Every number over two axes of values; what failed is crossed out."""
+    """Every number over two axes of values; where it failed it is crossed out."""
     dimensions = list(found.study.design.dimensions)
     along = dimensions.index(up.key), dimensions.index(across.key)
     steps = [math.ceil(len(axis.values) / CELLS) for axis in (up, across)]
@@ -60,14 +60,14 @@ def _map(found: Gathered, across: Axis, up: Axis) -> Plot:
     )
     x, y = np.tile(x, y.size), np.repeat(y, x.size)
     of = laid(_points(found))[:, 0]
-    failed = (laid(found.reasons.reshape(found.study.design.shape)) != "").any(axis=1)
-    crossed = Series(
-        x=x[failed], y=y[failed], name=FAILED if failed.any() else "", mark="crosses",
-        colour="ink", of=tuple(of[failed].tolist()),
-    )  # fmt: skip
     panels = []
     for name, column in found.numbers().items():
         z = _known_mean(laid(column))
+        failed = laid(_failed(found, column)).any(axis=1)
+        crossed = Series(
+            x=x[failed], y=y[failed], name=FAILED if failed.any() else "",
+            mark="crosses", colour="ink", of=tuple(of[failed].tolist()),
+        )  # fmt: skip
         cells = Series(
             x=x, y=y, z=z, z_unit=found.unit(name), name=name, mark="cells",
             of=tuple(of.tolist()),
@@ -83,6 +83,13 @@ def _map(found: Gathered, across: Axis, up: Axis) -> Plot:
         x_unit=across.unit,
         panels=tuple(panels),
     )
+
+
+def _failed(found: Gathered, column: FloatArray) -> NDArray[np.bool_]:
+    """Where a point that was refused or failed has no such number."""
+    why = found.reasons.reshape(found.study.design.shape)
+    failed: NDArray[np.bool_] = (why != "") & ~np.isfinite(column)
+    return failed
 
 
 def _points(found: Gathered) -> NDArray[np.intp]:
@@ -104,9 +111,9 @@ def _response(found: Gathered, axis: Axis, number: int, at: FloatArray) -> Plot:
         design.sampled if design.drawn else design.repeat > 1
     )
     points = np.moveaxis(_points(found), along, 0)
-    failed = np.moveaxis(found.reasons.reshape(design.shape) != "", along, 0)
     panels = []
     for name, column in found.numbers().items():
+        failed = np.moveaxis(_failed(found, column), along, 0)
         if design.drawn and design.repeat > 1:
             column = _known_mean(column)  # one number of each draw
         if by is None:

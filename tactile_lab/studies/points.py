@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.errors import TactileLabError, UnsafeError
+from tactile_lab.errors import ParameterError, TactileLabError, UnsafeError
 from tactile_lab.model.equations import critical_force
 from tactile_lab.planning.preview import DEFAULT_TOLERANCE, model
 from tactile_lab.planning.timeline import Timeline, timeline
@@ -101,29 +101,29 @@ class Points:
             for name, column in columns.items():
                 parts[name].append((rows, column))
         left = np.flatnonzero(alone)
-        found: list[Mapping[str, Value] | None] = []
+        found: list[Mapping[str, Value]] = []
         for row in left.tolist():
             values = by_point([column[row : row + 1] for column in task.columns])
             try:
                 address = bytes(task.addresses[row]).hex()
                 repeat = int(task.repeats[row])
-                one = self.compute(values[0] if values else (), repeat, address)
+                one, why = self.compute(values[0] if values else (), repeat, address)
             except UnsafeError:
                 raise
-            except Exception as error:  # whatever a user's protocol or function raises
-                reasons[row] = _why(error)
-                found.append(None)
-            else:
-                found.append(one)
+            except Exception as error:  # whatever a user's protocol raises
+                one, why = {}, _why(error)
+            found.append(one)
+            if why:
+                reasons[row] = why
         for name, some in parts.items() if left.size else ():
-            some.append((left, packed([None if r is None else r[name] for r in found])))
+            some.append((left, packed([one.get(name) for one in found])))
         columns = {name: placed(some, size) for name, some in parts.items()}
         return Batch(task.addresses, columns, reasons)
 
     def compute(
         self, values: Sequence[Any], repeat: int, address: str
-    ) -> dict[str, Value]:
-        """What is kept of one point, by name.
+    ) -> tuple[dict[str, Value], str]:
+        """What is kept of one point, by name, and why the rest is not; "" if all is.
 
         Raises:
             TactileLabError: the point is refused or fails.
@@ -195,7 +195,17 @@ class Points:
             keep_times=any(one.needs_times for one in self._study.kept),
         )
 
-    def _modelled(self, values: Sequence[Any]) -> dict[str, Value]:
+    def _kept(self, names: Mapping[str, Any]) -> tuple[dict[str, Value], str]:
+        """Of one point, by the names it gives; what fails takes nothing with it."""
+        found, why = {}, []
+        for one in self._study.kept:
+            try:
+                found[one.name] = one.of(names)
+            except ParameterError as error:
+                why.append(str(error))
+        return found, "; ".join(why)
+
+    def _modelled(self, values: Sequence[Any]) -> tuple[dict[str, Value], str]:
         if self._alike:
             (group,) = self._axes.groups([[value] for value in values], 1)
             scene, drive = self._with(group.others)
@@ -214,7 +224,7 @@ class Points:
             "scene": scene,
             **_always(drive),
         }
-        return {one.name: one.of(names) for one in self._study.kept}
+        return self._kept(names)
 
     @cached_property
     def _signals(self) -> tuple[str, ...]:
@@ -238,7 +248,9 @@ class Points:
 
     # --- the whole bench
 
-    def _run(self, scene: Scene, repeat: int, address: str) -> dict[str, Value]:
+    def _run(
+        self, scene: Scene, repeat: int, address: str
+    ) -> tuple[dict[str, Value], str]:
         from tactile_lab.acquisition.events import RunState
         from tactile_lab.engine.execution import Execution
         from tactile_lab.report.findings import find
@@ -275,7 +287,7 @@ class Points:
             }
             if any("answer" in one.expression for one in self._study.kept):
                 names["answer"] = find(read(done.folder)).conclusion.plain
-            return {one.name: one.of(names) for one in self._study.kept}
+            return self._kept(names)
 
     def _scene(self, values: Sequence[Any]) -> Scene:
         return load(self._study.scene, changed(self._study.design.axes, values))

@@ -20,6 +20,7 @@ from tactile_lab.errors import (
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
 from tactile_lab.studies.carry_out import StudyProgress, carry_out, forecast
+from tactile_lab.studies.figures import plots
 from tactile_lab.studies.live import look_at
 from tactile_lab.studies.page import write_page
 from tactile_lab.studies.study import load_study
@@ -153,6 +154,39 @@ def test_expressions_and_functions_of_a_user(tmp_path: Path) -> None:
     found, _ = done(load_study(own), tmp_path)
     assert 3.5 < found.numbers()["rest"] < 5.0
     assert 3.5 < found.numbers()["last"] < 5.0
+
+
+def test_an_expression_that_fails_at_a_point_takes_no_other_value_with_it(
+    tmp_path: Path,
+) -> None:
+    """Solved with others, or alone; the one that fails is named."""
+    levels = {"key": "protocol.levels", "values": [["20 mN"], ["200 mN"]]}
+    for first in ("spikes[0]", "result.spike_times[0]"):
+        keep = {"number": "len(spikes)", "first": first, "other": f"1e3 * {first}"}
+        asked = load_study({**SHORT, "axis": [levels], "keep": keep})
+        found, told = done(asked, tmp_path)
+        assert told[-1].failed == found.failed == 1
+        numbers = found.numbers()
+        assert numbers["number"].tolist() == [0.0, numbers["number"][1]]
+        assert np.isnan(numbers["first"]).tolist() == [True, False]
+        assert found.reasons[0].startswith("first: IndexError")
+        assert "; other: IndexError" in found.reasons[0] and not found.reasons[1]
+
+
+def test_a_point_is_crossed_out_only_where_it_has_no_value(tmp_path: Path) -> None:
+    V_GS = {"key": "sensor.V_GS", "values": "1.38 V : 1.40 V : 20 mV"}
+    R1 = {"key": "sensor.R1", "values": ["9 MOhm", "10 MOhm"]}
+    keep = {"number": "len(spikes)", "first": "spikes[0] if spikes.size else [][0]"}
+    silent = {**SHORT["set"], "protocol.levels": ["20 mN"]}
+    asked = {**SHORT, "set": silent, "axis": [V_GS, R1], "keep": keep}
+    found, _ = done(load_study(asked), tmp_path)
+    assert found.failed == 4
+    for plot in plots(found):
+        crosses = [
+            sum(len(series.x) for series in panel.series if series.mark == "crosses")
+            for panel in plot.panels
+        ]
+        assert crosses[0] == 0 < crosses[1], plot.name
 
 
 def test_the_whole_bench_repeats_with_seeds(tmp_path: Path) -> None:
