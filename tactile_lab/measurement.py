@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 
 CUT_OFF = "spikes could not be told all of the time: their channel left its range"
 BETWEEN_SAMPLES = "spikes are missed: one fits between two samples of V_K"
-"""Why a trial has no latency, rate or fit: its spikes are not all counted."""
+TOO_FAST = "spikes come faster than the circuit can fire; raise the threshold"
+"""Why a trial has no latency, rate or fit: its spikes are not all counted, or are not
+the circuit's."""
 DAGGER = "†"
 """Behind a number of spikes that are not all counted."""
 NOT_HELD = "no one force is held"
@@ -102,8 +104,9 @@ class MeasuredTrial:
             the part of its hold that was held.
         clock_uncertainty: bound on how far spike times lie from the coil's, s: how well
             the scope's clock is aligned with the host's; None if not known.
-        uncounted: why its spikes are not all counted, `CUT_OFF` or `BETWEEN_SAMPLES`:
-            those seen are told, and no latency, rate or fit. "" where all are.
+        uncounted: why its spikes are no count, `CUT_OFF`, `BETWEEN_SAMPLES` or
+            `TOO_FAST`: those seen are told, and no latency, rate or fit. "" where they
+            are one.
         skipped: the coil's set-points that came too late: its force was not all that
             was asked for.
     """

@@ -126,7 +126,7 @@ def levels(results: Results) -> list[str]:
     told = []
     for trial in results["trials"]:
         text = f"{trial['label']}: {trial['spikes']} spikes"
-        text += " seen, not all" if trial["uncounted"] else ""
+        text += " seen, no count" if trial["uncounted"] else ""
         peak, final = trial["peak_rate_Hz"], trial["final_rate_Hz"]
         if peak is not None and final is not None:
             text += f", from {show(peak, 'Hz', 3)} down to {show(final, 'Hz', 3)}"

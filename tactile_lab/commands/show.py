@@ -162,7 +162,7 @@ def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
         late = f", {count(skipped, 'set-point')} skipped" if skipped else ""
         spikes = trial["spikes"]
         told = "" if spikes is None else f", {count(spikes, 'spike')}"
-        told += " seen, not all" if trial["uncounted"] else ""
+        told += " seen, no count" if trial["uncounted"] else ""
         yield "trial", f"{trial['label']:<12} {times}{told}{cut}{late}"
     if summary["overrange_blocks"]:
         yield "over range", f"in {summary['overrange_blocks']} blocks"

@@ -247,7 +247,7 @@ def _spikes(run: Measurement, axis: ClosedTime) -> list[Told]:
     every = np.concatenate([*spikes, []])
     panel, said = spike_train(every, axis.begin, axis.end, looked)
     if any(t.uncounted for t in trials):
-        said += " that were seen, not all there were"
+        said += " that were seen, no count of those there were"
     train = panel, said
     at, rates = _rates(
         [times for t, times in zip(trials, spikes, strict=True) if not t.uncounted]

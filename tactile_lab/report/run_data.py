@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from tactile_lab.analysis.belief import Belief
 from tactile_lab.arrays import FloatArray
-from tactile_lab.measurement import Measurement
+from tactile_lab.measurement import TOO_FAST, Measurement
 from tactile_lab.model.state import Start
 from tactile_lab.trial import Protocol
 
@@ -94,8 +94,10 @@ class RunData(Measurement):
 
     @property
     def train(self) -> FloatArray | None:
-        """Spikes that tell of the circuit, s; None where some, or all, are missed."""
-        return self.spike_times if self.searched and self.counted else None
+        """Spikes that tell of the circuit, s; None where some are missed, or false."""
+        false = any(trial.uncounted == TOO_FAST for trial in self.trials)
+        told = self.searched and self.counted and not false
+        return self.spike_times if told else None
 
     @property
     def subtitle(self) -> str:

@@ -43,7 +43,7 @@ def trials_table(run: Measurement) -> Table:
     if run.force_uncertainty is not None:
         note += " Force: ± its 95 % uncertainty by calibration and geometry."
     if any(trial.uncounted for trial in run.results):
-        note += f" {DAGGER}: not all spikes are counted, these were seen."
+        note += f" {DAGGER}: seen, no count of the spikes there were."
     named = any(trial.name != _force(trial) for trial in run.results)
     headings = (
         *("Trial",) * named,

@@ -1,25 +1,46 @@
-"""Of which trials not all spikes are counted, and why: no rate is told of them."""
+"""Of which trials the spikes are no count, and why: no rate is told of them."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import SceneError
-from tactile_lab.measurement import BETWEEN_SAMPLES, CUT_OFF
+from tactile_lab.measurement import BETWEEN_SAMPLES, CUT_OFF, TOO_FAST
+from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import shortest_interval
 from tactile_lab.store.overrange import unsearched
 from tactile_lab.store.stored_run import StoredRun
 
+FEWEST, FALSE = 3, 0.1
+"""So many intervals, and such a part of them, that no circuit can give: more than a
+spike that noise adds now and then among right ones."""
+
 
 def uncounted(run: StoredRun) -> list[str]:
-    """Why the spikes of each trial are not all counted; "" where they are."""
-    blind = unsearched(run)
+    """Why the spikes of each trial are no count; "" where they are one."""
+    blind, spikes, circuit = unsearched(run), run.spikes["time"], _believed(run)
     elsewhere = "" if samples_catch_spikes(run) else BETWEEN_SAMPLES
-    return [
-        CUT_OFF
-        if np.any((blind[:, 0] < row["end"]) & (blind[:, 1] > row["start"]))
-        else elsewhere
-        for row in run.trials
-    ]
+    found = []
+    for row in run.trials:
+        start, end = row["start"], row["end"]
+        seen = spikes[(spikes >= start) & (spikes < end)]
+        if np.any((blind[:, 0] < end) & (blind[:, 1] > start)):
+            found.append(CUT_OFF)
+        elif circuit is not None and faster_than(circuit, seen):
+            found.append(TOO_FAST)
+        else:
+            found.append(elsewhere)
+    return found
+
+
+def faster_than(circuit: Circuit, spike_times: FloatArray) -> bool:
+    """Whether spikes, s, shape (n,), come faster than `circuit` can fire.
+
+    A few that do are let pass, as false ones among right ones.
+    """
+    short = np.count_nonzero(np.diff(spike_times) < shortest_interval(circuit))
+    return bool(short >= max(FEWEST, FALSE * (spike_times.size - 1)))
 
 
 def samples_catch_spikes(run: StoredRun) -> bool:
@@ -30,8 +51,15 @@ def samples_catch_spikes(run: StoredRun) -> bool:
     detection = run.info.get("detection") or {}
     if detection.get("signal") != "V_K":
         return True
+    circuit = _believed(run)
+    return circuit is None or circuit.shows_spikes(
+        detection["threshold_V"], run.info["sample_rate_Hz"]
+    )
+
+
+def _believed(run: StoredRun) -> Circuit | None:
+    """The circuit as it is believed to be; None where the scene cannot be read."""
     try:
-        circuit = run.scene.circuit
+        return run.scene.circuit
     except SceneError:
-        return True
-    return circuit.shows_spikes(detection["threshold_V"], run.info["sample_rate_Hz"])
+        return None

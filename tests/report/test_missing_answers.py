@@ -10,7 +10,7 @@ from protocols.hold import Hold
 from tactile_lab.commands.show import describe, rows
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import NotIdentifiableError
-from tactile_lab.measurement import CUT_OFF, MeasuredTrial
+from tactile_lab.measurement import CUT_OFF, TOO_FAST, MeasuredTrial
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.plugins import protocol_class
 from tactile_lab.report.findings import find
@@ -22,6 +22,7 @@ from tactile_lab.report.table import trials_table
 from tactile_lab.report.write import write
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
+from tactile_lab.store.uncounted import faster_than
 
 
 def test_a_trial_whose_spikes_could_not_be_told_has_a_count_and_no_rate():
@@ -53,16 +54,51 @@ def test_no_rate_is_told_of_spikes_that_fall_between_two_samples(tmp_path):
     assert "between two samples" in trial["uncounted"]
     told = trials_table(found.run)
     assert f"{trial['spikes']}†" in told.rows[0]
-    assert "†: not all" in told.note
+    assert "†: seen, no count" in told.note
     assert f"{trial['spikes']}†" in page(found, ())
     assert "between two samples" in " ".join(found.missing)
     assert "completed" not in " ".join(found.missing)
     assert not found.conclusion.sentences
     assert "Rate" not in {panel.label for panel in overview(found.run).panels}
     lines = [str(value) for _, value in rows(describe(folder))]
-    assert any(line.endswith("spikes seen, not all") for line in lines)
+    assert any(line.endswith("spikes seen, no count") for line in lines)
     with Run.load(folder) as run, pytest.raises(NotIdentifiableError, match="between"):
         run.adaptation()
+
+
+def test_nothing_is_told_of_spikes_that_come_faster_than_the_circuit_can_fire(tmp_path):
+    """The answer to a cause was sought over 9,494 of them, for minutes."""
+    asked = {
+        "protocol.levels": (0.2,),
+        "protocol.hold": 1.0,
+        "protocol.rest": 0.2,
+        "simulated.noise.V_K": 0.15,
+        "simulated.deviation.V_GS": 4e-3,
+    }
+    folder = Execution(load("demo", asked), tmp_path).run().folder
+    found = find(read(folder))
+    (trial,) = results(found)["trials"]
+    assert trial["spikes"] > 500, "what was seen is told"
+    fits = "adaptation", "circuit_adaptation"
+    for key in ("latency_s", "peak_rate_Hz", "final_rate_Hz", "fall", *fits):
+        assert trial[key] is None, key
+    assert trial["uncounted"] == TOO_FAST
+    assert f"No latency, rate or fit of 200 mN: {TOO_FAST}." in found.missing
+    assert not found.conclusion.sentences
+    assert found.run.train is None, "no cause is sought in them"
+    assert found.beside is not None and found.beside.explanation is not None
+    assert found.beside.explanation.cause is None
+    with Run.load(folder) as run, pytest.raises(NotIdentifiableError, match="faster"):
+        run.adaptation()
+
+
+def test_a_false_spike_among_right_ones_takes_no_number_with_it():
+    circuit, right = load("demo").circuit, np.arange(0.3, 3.0, 0.1)
+    assert not faster_than(circuit, right)
+    for extra, told in ((right[:2], False), (right[:1], False), (right, True)):
+        seen = np.sort(np.concatenate([right, extra + 1e-3]))
+        assert faster_than(circuit, seen) is told
+    assert not faster_than(circuit, np.array([0.3, 0.301])), "two tell too little"
 
 
 def test_what_no_spikes_are_needed_for_is_told_though_some_are_missed(tmp_path):
