@@ -63,7 +63,12 @@ class RateForce(Recovering, Levels):
         ramp = next((t.hold[0] for t in run.results if t.hold is not None), None)
         expected: tuple[Series, ...] = ()
         if run.circuit is not None and ramp is not None and forces:
-            swept = np.linspace(0.9 * min(forces), 1.03 * max(forces), 400)
+            low, high = min(forces), max(forces)
+            low, high = (
+                low * (0.9 if low > 0 else 1.03),
+                high * (1.03 if high > 0 else 0.9),
+            )
+            swept = np.linspace(low, high, 400)
             rate = [eq15_rate(run.circuit, float(f), ramp) for f in swept]
             expected = (
                 Series(x=swept, y=rate, name="Eq. (15)", mark="dashed", colour="I_DS"),

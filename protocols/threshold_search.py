@@ -17,13 +17,12 @@ from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
 from tactile_lab.errors import LimitError, NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
-from tactile_lab.quantity import Duration, Pause, Unit, show
+from tactile_lab.quantity import Duration, Force, Pause, Unit, show
 from tactile_lab.stimulus.force import step
 from tactile_lab.stimulus.recovery import Recovering, first_rest
 from tactile_lab.trial import Outcome, Trial, Trials
 from tactile_lab.waveform import Waveform
 
-PushForce = Annotated[float, Unit("N", least=0.0)]
 Resolution = Annotated[float, Unit("N", above=0.0)]
 TOLD = 1e-3
 """Part of V_fire by which it has to scatter to be told."""
@@ -32,6 +31,7 @@ TOLD = 1e-3
 class ThresholdSearch(Recovering):
     """Bisect for the smallest force that makes the sensor fire.
 
+    Of pulls, below 0 N, it is the weakest: a sensor may be mounted the other way.
     The critical force belongs to its ramp and hold: the slower the ramp, the more the
     film adapts meanwhile. Both are stated with the result.
     """
@@ -39,17 +39,18 @@ class ThresholdSearch(Recovering):
     name: ClassVar[str] = "threshold_search"
     title: ClassVar[str] = "Critical force"
 
-    low: PushForce = Field(default=0.06, description="Force expected to stay silent")
-    high: PushForce = Field(default=0.14, description="Force expected to fire")
+    low: Force = Field(default=0.06, description="Force expected to stay silent")
+    high: Force = Field(default=0.14, description="Force expected to fire")
     resolution: Resolution = Field(default=1e-3, description="Width to end with")
     ramp: Pause = Field(default=0.25, description="Ramp up and ramp down, each")
     hold: Duration = Field(default=1.0, description="Time at each level")
 
     @model_validator(mode="after")
     def _ordered(self) -> ThresholdSearch:
-        if self.low >= self.high:
+        if abs(self.low) >= abs(self.high) or self.low * self.high < 0:
             raise ValueError(
-                f"low {show(self.low, 'N')} must be below high {show(self.high, 'N')}"
+                f"low {show(self.low, 'N')} must be nearer to 0 N than high "
+                f"{show(self.high, 'N')}, and of the same sign"
             )
         return self
 
@@ -63,18 +64,19 @@ class ThresholdSearch(Recovering):
         first = first_rest(outcome)
         if not fired(outcome):
             raise LimitError(
-                f"{show(self.high, 'N')} does not make the sensor fire; raise "
-                "protocol.high, or trim V_GS so that it sits nearer to its threshold."
+                f"{show(self.high, 'N')} does not make the sensor fire; take "
+                "protocol.high farther from 0 N, or trim V_GS so that it sits nearer "
+                "to its threshold."
             )
         yield from self.recover(self.high, first)
         outcome = yield self._step(self.low)
         if fired(outcome):
             raise LimitError(
-                f"{show(self.low, 'N')} already makes the sensor fire; lower "
-                "protocol.low. If it fires at rest, lower V_GS."
+                f"{show(self.low, 'N')} already makes the sensor fire; take "
+                "protocol.low nearer to 0 N. If it fires at rest, lower V_GS."
             )
         low, high, last = self.low, self.high, self.low
-        while high - low > self.resolution * (1 + 1e-9):
+        while abs(high - low) > self.resolution * (1 + 1e-9):
             yield from self.recover(last, first)
             last = (low + high) / 2
             outcome = yield self._step(last)

@@ -14,6 +14,7 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import I_C, rest_V_C1
+from tactile_lab.quantity import show
 
 STEP = 1e-4
 """Force over which a slope is taken, N."""
@@ -34,7 +35,7 @@ class Bracket:
     @property
     def half_width(self) -> float:
         """Half the bracket."""
-        return (self.fires - self.silent) / 2
+        return abs(self.fires - self.silent) / 2
 
 
 def eq15_rate(circuit: Circuit, force: float, ramp: float = 0.0) -> float:
@@ -202,12 +203,14 @@ def fit_rate_law(
 def onset(forces: Sequence[float], spikes: Sequence[int]) -> Bracket:
     """Bracket of the critical force from trials that each started from rest.
 
+    Below 0 N it may be one of pulls: the sensor fires under the stronger ones.
+
     Args:
         forces: N.
         spikes: number of spikes at each force.
 
     Raises:
-        NotIdentifiableError: all fire, none fires, or a larger force was silent.
+        NotIdentifiableError: all fire, none fires, or a stronger force was silent.
     """
     fired = np.array(spikes) > 0
     levels = np.array(forces, dtype=np.float64)
@@ -215,11 +218,12 @@ def onset(forces: Sequence[float], spikes: Sequence[int]) -> Bracket:
         raise NotIdentifiableError("no spike was detected at any of these forces")
     if fired.all():
         raise NotIdentifiableError("every force made the sensor fire")
-    lowest = float(levels[fired].min())
-    below = levels[~fired]
-    if below.max() >= lowest:
-        raise NotIdentifiableError(
-            f"{below.max() * 1e3:g} mN silent though {lowest * 1e3:g} mN fired: not at "
-            "rest, or a drift"
-        )
-    return Bracket(float(below.max()), lowest)
+    for way in (1, -1) if levels[fired].max() < 0 else (1,):
+        silent = way * float((way * levels[~fired]).max())
+        fires = way * float((way * levels[fired]).min())
+        if way * silent < way * fires:
+            return Bracket(silent, fires)
+    raise NotIdentifiableError(
+        f"{show(silent, 'N', 6)} silent though {show(fires, 'N', 6)} fired: not at "
+        "rest, or a drift"
+    )

@@ -1,4 +1,5 @@
 import math
+import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -18,10 +19,12 @@ from protocols.sine_sweep import SineSweep
 from protocols.staircase import Staircase
 from protocols.threshold_search import ThresholdSearch
 from protocols.wiring_check import WiringCheck
-from tactile_lab.errors import LimitError
+from tactile_lab.analysis.rate_force import onset
+from tactile_lab.errors import LimitError, NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
+from tactile_lab.quantity import show
 from tactile_lab.stimulus.demagnetise import demagnetising_current
 from tactile_lab.stimulus.recovery import MOST_EXTENSIONS
 from tactile_lab.trial import Outcome
@@ -245,16 +248,15 @@ def test_threshold_search_finds_the_models_critical_force():
     assert levels[-1] == pytest.approx(96.1e-3, abs=3e-4)
 
 
-def test_threshold_search_carries_the_follower_s_bias_into_V_GS():
-    """The true follower draws 10 pA less than believed, half of its band."""
-    believed, search = Circuit(I_bias=65e-12), ThresholdSearch()
-    true, trials, force = replace(believed, I_bias=55e-12), [], None
+def searched(search, true, believed):
+    """The run that a search makes of a sensor, and what is believed of it."""
+    trials, force = [], None
 
     def answer(trial):
         nonlocal force
         if trial.pause:
             return outcome_of(trial)
-        spikes = simulate(true, trial.force).spike_times
+        found = simulate(true, trial.force).spike_times
         start = 0.0 if force is None else force.end
         force = trial.force if force is None else force.then(trial.force)
         trials.append(
@@ -263,13 +265,13 @@ def test_threshold_search_carries_the_follower_s_bias_into_V_GS():
                 level=trial.level,
                 start=start,
                 duration=trial.length,
-                spike_times=spikes,
+                spike_times=found,
             )
         )
-        return outcome_of(trial, spikes=spikes)
+        return outcome_of(trial, spikes=found)
 
     drive(search, answer)
-    run = Measurement(
+    return Measurement(
         simulated=True,
         bench="made up",
         duration=force.end,
@@ -277,6 +279,72 @@ def test_threshold_search_carries_the_follower_s_bias_into_V_GS():
         force=force,
         circuit=believed,
     )
+
+
+def test_a_sensor_that_fires_when_pulled_has_its_critical_force_below_zero():
+    """All but the sign is as of the sensor that fires when pushed."""
+    pushed = Circuit()
+    pulled = replace(pushed, g31=-pushed.g31)
+    push, pull = ThresholdSearch(), ThresholdSearch(low=-0.06, high=-0.14)
+    above, below = (
+        search.conclude(searched(search, circuit, circuit))
+        for search, circuit in ((push, pushed), (pull, pulled))
+    )
+    for name, sign in (("critical_force_N", -1), ("critical_force_half_width_N", 1)):
+        assert below.values[name] == pytest.approx(sign * above.values[name])
+        assert above.values[name] > 0
+    for name in ("V_GS_low_V", "V_GS_high_V"):
+        assert below.values[name] == pytest.approx(above.values[name], abs=5e-5)
+    assert below.values["V_GS_low_V"] < pulled.V_GS < below.values["V_GS_high_V"]
+    assert re.search(r"between −9\d(\.\d+)? mN \(silent\) and −9\d", below.text)
+    (plot,) = pull.plots(searched(pull, pulled, pulled))
+    (band,) = plot.panels[0].guides
+    assert band.at < below.values["critical_force_N"] < band.to < 0
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(-0.06, 0.14), (0.06, -0.14), (-0.14, -0.06), (0.14, 0.06)]
+)
+def test_a_search_goes_one_way_from_zero(low, high):
+    with pytest.raises(ValueError, match="nearer to 0 N than high"):
+        ThresholdSearch(low=low, high=high)
+
+
+def test_rates_of_pulls_have_a_critical_force_and_an_expectation():
+    levels = (-0.08, -0.12, -0.16)
+    trials = tuple(
+        MeasuredTrial(
+            label=show(level, "N"), level=level, start=2.0 * i, duration=2.0,
+            hold=(0.25, 1.25), spike_times=0.3 + np.arange(3 * i) / 10,
+        )
+        for i, level in enumerate(levels)
+    )  # fmt: skip
+    force = Waveform.constant(0.0)
+    pulled = replace(Circuit(), g31=-Circuit().g31)
+    run = Measurement(
+        simulated=True, bench="made up", duration=6.0, trials=trials, force=force,
+        circuit=pulled,
+    )  # fmt: skip
+    (plot,) = RateForce(levels=levels).plots(run)
+    assert plot.panels[0].guides[0].to == pytest.approx(-0.08)
+    (line,) = (one for one in plot.panels[0].series if one.mark == "dashed")
+    assert min(line.x) < min(levels) and max(levels) < max(line.x) < 0
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_larger_force_that_was_silent_is_refused_either_way(sign):
+    forces = [sign * mN / 1e3 for mN in (80, 100, 120)]
+    found = onset(forces, [0, 1, 4])
+    assert (found.silent, found.fires) == (forces[0], forces[1])
+    assert found.half_width == pytest.approx(0.01)
+    with pytest.raises(NotIdentifiableError, match=r"120 mN silent though −?100 mN"):
+        onset(forces, [0, 1, 0])
+
+
+def test_threshold_search_carries_the_follower_s_bias_into_V_GS():
+    """The true follower draws 10 pA less than believed, half of its band."""
+    believed, search = Circuit(I_bias=65e-12), ThresholdSearch()
+    run = searched(search, replace(believed, I_bias=55e-12), believed)
     biased = replace(believed, I_bias=believed.I_bias + 20e-12)
     found = search.conclude(replace(run, displaced={"follower": biased}))
     low, high = found.values["V_GS_low_V"], found.values["V_GS_high_V"]
