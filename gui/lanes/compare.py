@@ -66,6 +66,15 @@ class Comparison(Source):
         return self._members
 
     @property
+    def rated(self) -> FloatArray:
+        """Of the reference."""
+        return self.first.rated
+
+    def tells_rate(self, start: float, end: float) -> bool:
+        """As the reference does."""
+        return self.first.tells_rate(start, end)
+
+    @property
     def reach(self) -> float:
         """End of the longest, s."""
         return max(m.source.reach + m.shift for m in self.members)

@@ -76,7 +76,9 @@ class LaneRow:
             words = interval_text(spikes, source.reach, steps)
             self.card.show_value(newest(self.lane, source))
         else:
-            words = view_text(spikes, view.start, edge, steps)
+            words = f"of {spikes.size}"
+            if source.tells_rate(view.start, edge):
+                words = view_text(spikes, view.start, edge, steps)
             seen = count_between(spikes, view.start, edge)
             self.card.show_value(float(seen), "in view")
         if not source.counted:

@@ -41,6 +41,15 @@ class Source:
     path: Path | None = None
 
     @property
+    def rated(self) -> FloatArray:
+        """Spikes of which a rate is told, s: all, where all are seen."""
+        return self.spikes if self.counted else NONE
+
+    def tells_rate(self, start: float, end: float) -> bool:
+        """Whether the spikes between two times, s, are a count, so have a rate."""
+        return self.counted
+
+    @property
     def of(self) -> Source:
         """What this is a view of: itself."""
         return self
@@ -138,13 +147,14 @@ class Source:
 
     def rate(self, time: float) -> float | None:
         """Rate at a time, s, in Hz; None where it cannot be told."""
-        return rate_at(self.spikes, time, starts(self.holds)) if self.counted else None
+        if not self.tells_rate(time, time):
+            return None
+        return rate_at(self.rated, time, starts(self.holds))
 
     def trace(self, key: str, start: float, end: float, count: int) -> Trace:
         """What a lane shows of the run: a signal, its residual, the rate."""
         if key == "rate":
-            seen = self.spikes if self.counted else NONE
-            return rate_of(seen, start, end, count, starts(self.holds))
+            return rate_of(self.rated, start, end, count, starts(self.holds))
         if key != "residual":
             return self.measured(key, start, end, count)
         # ahead of the twin is the plan: measured less that is no error of the model

@@ -68,6 +68,8 @@ class RunSource(Source):
         self.onsets = _onsets(run, self.trials)
         self.uncounted = uncounted(run)
         self.counted = samples_catch_spikes(run)
+        reasons = zip(self.holds, self.uncounted, strict=True)
+        self._unrated = [hold for hold, why_not in reasons if why_not]
         self.simulated = run.simulated
         self.moves_probes, self.sets_voltages = _moves(run)
         self._threshold = threshold_of(run)
@@ -95,6 +97,23 @@ class RunSource(Source):
     def sampled(self) -> bool:
         """Whether samples were to be stored: a run may do without a scope."""
         return bool(self._pyramids)
+
+    @property
+    def rated(self) -> FloatArray:
+        """Those of the steps whose spikes are a count."""
+        if not self._unrated:
+            return super().rated
+        told = np.full(self.spikes.size, self.counted)
+        for one in self._unrated:
+            first, last = np.searchsorted(self.spikes, (one.start, one.end))
+            told[first:last] = False
+        kept: FloatArray = self.spikes[told]
+        return kept
+
+    def tells_rate(self, start: float, end: float) -> bool:
+        """Not where they touch a step whose spikes are no count."""
+        unrated = any(one.start < end and start < one.end for one in self._unrated)
+        return self.counted and not unrated
 
     @property
     def loop(self) -> FloatArray:

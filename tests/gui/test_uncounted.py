@@ -1,7 +1,13 @@
 """No rate is told where spikes fall between two samples of V_K, as in the report."""
 
+import h5py
+import numpy as np
+
+from tactile_lab.engine.execution import Execution
 from tactile_lab.engine.request import Request
 from tactile_lab.measurement import BETWEEN_SAMPLES
+from tactile_lab.scene.load import load
+from tactile_lab.store.run import Run
 
 
 def told(lab, key: str) -> tuple[str, str]:
@@ -54,3 +60,38 @@ def test_a_run_that_sees_all_spikes_tells_their_rate(lab) -> None:
     lab.until(lambda: getattr(window.screen_.run, "path", None) == folder)
     assert not window.screen_.run.trace("rate", 0.0, 5.0, 100).empty
     assert told(lab, "rate")[0] != "—" and told(lab, "rate")[1] == ""
+
+
+def test_no_rate_is_told_in_a_step_whose_channel_left_its_range(lab, tmp_path) -> None:
+    """The report refuses that step; the lane drew 12 Hz in it."""
+    asked = {
+        "protocol.levels": (0.2, 0.2), "protocol.hold": 1.0, "protocol.rest": 0.5,
+    }  # fmt: skip
+    folder = Execution(load("demo", asked), tmp_path).run().folder
+    with Run.load(folder) as run:
+        (cut, told), bit = run.trials["start"], list(run.signals).index("V_K")
+        first = run.signal("V_K").between(cut + 0.4).start
+    with h5py.File(folder / "data.h5", "a") as file:  # as the scope tells of a block
+        rows = file["overrange"]
+        rows.resize(len(rows) + 1, axis=0)
+        rows[-1] = (first, 1000, 1 << bit)
+        file["spikes"].attrs["threshold"] = -1  # and V_K never lay below it
+    window = lab.window
+    window.screen_.open_run(folder)
+    lab.until(lambda: getattr(window.screen_.run, "path", None) == folder)
+    source = window.screen_.run
+    assert [bool(why) for why in source.uncounted] == [True, False]
+    seen = source.spikes
+    assert np.count_nonzero((seen > cut) & (seen < told)) > 3
+    drawn = source.trace("rate", 0.0, source.reach, 1000)
+    assert drawn.time.size > 3 and drawn.time.min() > told
+    assert source.rate(cut + 0.8) is None and source.rate(told + 0.8) > 1
+    view, readout = window.centre.view, window.centre.tools.readout
+    view.show_span(cut, 1.0)
+    window.centre.stack.show_values()
+    assert "ISI" not in window.centre.stack.row("spikes").card.more
+    view.place_cursors(cut + 0.3, cut + 0.9)
+    assert "Hz" not in readout.toolTip()
+    view.place_cursors(told + 0.3, told + 0.9)
+    assert "Hz" in readout.toolTip()
+    view.clear_cursors()
