@@ -252,9 +252,10 @@ class ConnectedBench(QObject):
             status.set_fault("The bench cannot be used.", reply.problem)
             return
         broken = [one for one in found.found if one.problem]
-        coil = self.spec.coil if self.spec is not None else None
-        if coil is not None and any(one.role == "coil" for one in found.found):
-            status.coil.use(coil.limits, coil.port)
+        spec, asked = self.spec, any(one.role == "coil" for one in found.found)
+        if asked and spec is not None and spec.coil is not None:
+            port = "" if spec.simulated else spec.coil.port
+            status.coil.use(spec.coil.limits, port)
         else:
             status.coil.use(None)
         self._take(found)

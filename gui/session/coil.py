@@ -47,10 +47,11 @@ class CoilWatch:
 
         Args:
             limits: of its coil; None without one.
-            port: where that is; "" without one.
+            port: where that is; "" without one, and of one that is only simulated: it
+                drives nothing once it is left.
         """
         left = {*self.left_unknown, *([self._port] if self.doubtful else [])}
-        self.left_unknown = tuple(sorted(left - {port}))
+        self.left_unknown = tuple(sorted(left - {port, ""}))
         self.limits, self._port = limits, port
         self._off = None
 

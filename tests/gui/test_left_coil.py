@@ -1,6 +1,10 @@
 """A coil that was left unknown stays told while another bench is connected."""
 
+from collections.abc import Callable
+from pathlib import Path
+
 import pytest
+from served_source import Source
 
 from gui.session.coil import CoilWatch
 from gui.state import CoilKnowledge, Lamp, WindowState
@@ -10,30 +14,27 @@ from tactile_lab.bench import CoilLimits, OffReport
 
 OFF = OffReport(True, 0.0, "Off, 0 mA read back.")
 
-PORT = "sim://coil-2"
-OTHER = f"""
+OTHER = """
 name = "other"
 simulated = true
 [coil]
 baud = 19200
-port = "{PORT}"
+port = "sim://coil-2"
 [magnet]
 r = "6 mm"
 """
 
 
-def leave_unknown(lab) -> None:
+def leave_unknown(lab, bench: Path, lose: Callable[[], object]) -> None:
     """Drive a coil by hand, lose its source, and take the built-in simulated bench."""
-    session, bench = lab.session, lab.folder / "other.toml"
-    bench.write_text(OTHER)
+    session = lab.session
     session.connect_bench(str(bench))
     lab.until(lambda: session.state is WindowState.READY)
     session.begin_manual()
     lab.until(lambda: session.manual.opened)
     session.manual.hold(0.1)
     lab.until(lambda: (coil := session.coil_view()) is not None and coil.output)
-    far = [far for name, far in serial_wires._far_ends.items() if "coil" in name][-1]
-    far.faults.add(SerialFault(kind="unplug", times=None))
+    lose()
     bench.write_text("broken")  # nor can it be asked again
     lab.until(lambda: session.state is WindowState.FAULT and not session.busy)
     while session.state is WindowState.FAULT:
@@ -44,17 +45,17 @@ def leave_unknown(lab) -> None:
     lab.until(lambda: session.state is WindowState.READY)
 
 
-def test_a_coil_left_unknown_is_told_beside_another_bench(lab) -> None:
-    leave_unknown(lab)
-    window, session = lab.window, lab.session
+def test_a_coil_left_unknown_is_told_beside_another_bench(lab, source: Source) -> None:
+    leave_unknown(lab, source.bench, source.served.close)
+    window, session, port = lab.window, lab.session, source.served.addresses["coil"]
     stop, banner = window.header.stop, window.banner
     assert stop.truth is CoilKnowledge.UNKNOWN
     assert stop.words.title == "COIL STATE UNKNOWN"
     assert "at the source" in stop.words.detail
-    assert banner.isVisible() and PORT in banner.accessibleName()
+    assert banner.isVisible() and port in banner.accessibleName()
     assert "Switch it off at the source" in banner.accessibleName()
     chip = window.header.chips[0]
-    assert chip.lamp is Lamp.BAD and PORT in chip.toolTip()
+    assert chip.lamp is Lamp.BAD and port in chip.toolTip()
 
     lab.run()
     assert stop.truth is CoilKnowledge.LIVE, "in a run STOP tells what it would stop"
@@ -66,7 +67,21 @@ def test_a_coil_left_unknown_is_told_beside_another_bench(lab) -> None:
     banner.is_off.click()
     assert stop.truth is CoilKnowledge.OFF and not banner.isVisible()
     assert session.state is WindowState.READY, "nothing of this bench is asked for it"
-    assert PORT in [line.text for line in session.log.lines if line.safety][-1]
+    assert port in [line.text for line in session.log.lines if line.safety][-1]
+
+
+def test_a_coil_that_is_only_simulated_drives_nothing_and_is_not_told(lab) -> None:
+    def unplug() -> None:
+        ends = serial_wires._far_ends
+        far = [far for name, far in ends.items() if "coil" in name][-1]
+        far.faults.add(SerialFault(kind="unplug", times=None))
+
+    bench = lab.folder / "other.toml"
+    bench.write_text(OTHER)
+    leave_unknown(lab, bench, unplug)
+    stop, chips = lab.window.header.stop, lab.window.header.chips
+    assert stop.truth is CoilKnowledge.OFF and not lab.window.banner.isVisible()
+    assert all("unknown" not in chip.toolTip() for chip in chips)
 
 
 def test_a_coil_is_known_again_once_it_has_answered() -> None:
