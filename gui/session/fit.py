@@ -21,6 +21,7 @@ from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial
+from tactile_lab.quantity import printed
 from tactile_lab.trace import Trace
 
 if TYPE_CHECKING:
@@ -251,7 +252,7 @@ def _card(
 def _onset(steps: Sequence[MeasuredTrial]) -> tuple[str, str]:
     found = onset([f.level or 0.0 for f in steps], [f.response.spikes for f in steps])
     low, high = found.silent * 1e3, found.fires * 1e3
-    return f"{number(found.middle * 1e3, 0)} mN", f"{low:.4g} to {high:.4g} mN"
+    return f"{number(found.middle * 1e3, 0)} mN", printed(f"{low:.4g} to {high:.4g} mN")
 
 
 def _slope(steps: Sequence[MeasuredTrial]) -> tuple[str, str]:

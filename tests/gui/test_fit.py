@@ -57,6 +57,12 @@ def test_cards_tell_onset_slope_and_why_not() -> None:
     assert cards["Adaptation 1/|β|"].detail.endswith(".")
 
 
+def test_the_onset_of_pulls_is_told_with_the_true_minus() -> None:
+    pulls = [replace(one, level=-(one.level or 0.0)) for one in STEPS]
+    card = next(card for card in fit(pulls, seen()).cards if card.name == "Onset")
+    assert (card.value, card.detail) == ("−100 mN", "−80 to −120 mN")
+
+
 def test_the_ends_of_an_interval_are_told_apart_and_where_it_is_in_words() -> None:
     """10.8 s stood above "11 to 11 s", and 10 % above "at in 8 ms"."""
     phases = np.arange(1.0, 250.0)
