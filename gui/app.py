@@ -18,6 +18,7 @@ from gui.look import fonts
 from gui.look.theme import Theme
 from gui.preferences import Preferences
 from gui.session.session import Session
+from gui.state import CoilKnowledge, stop_truth
 from gui.tool_tips import ToolTips
 from gui.within_reach import WithinReach, fit
 from tactile_lab.engine.memory import map_large, share_heap
@@ -93,8 +94,9 @@ def main(
     with collected_here():
         app.exec()
         session.close()
-    coil = session.status.coil
-    return 4 if coil.left_unknown or coil.doubtful else 0
+    left = session.status.coil.left_unknown
+    said = stop_truth(session.state, session.coil_view(), left)
+    return 4 if said is CoilKnowledge.UNKNOWN else 0
 
 
 def show_skin(path: Path, out: Path, theme: str) -> None:

@@ -10,6 +10,10 @@ from tactile_lab.quantity import printed, show
 STALE = 1.5
 """Seconds without a word from a live coil's source after which its state is unknown."""
 
+HOLDS = 120.0
+"""Seconds after which an answer no longer says that an instrument is there, nor that
+an output is off."""
+
 LAGS, MOVED = 0.3, 5e-3
 """Age of a read-back, s, from which on it says nothing of a set-point that has moved
 by so much since, A."""
@@ -50,7 +54,9 @@ class CoilKnowledge(Enum):
     """What is known about the coil, from read-back, never from commands."""
 
     NONE = "none"
+    ASKED = "asked"
     OFF = "off"
+    WAS_OFF = "was off"
     LIVE = "live"
     FALLING = "falling"
     UNKNOWN = "unknown"
@@ -188,14 +194,19 @@ def truth(state: WindowState, coil: CoilView | None) -> CoilKnowledge:
     """What may be claimed about the coil.
 
     A live coil whose source has been silent for longer than `STALE` is unknown, and so
-    is one whose switching off could not be verified.
+    is one whose switching off could not be verified. One that was verified off longer
+    than `HOLDS` ago was off then; one of a bench that is being connected is asked.
     """
     if coil is None:
         return CoilKnowledge.NONE
+    never = coil.output is None and coil.verified_off is None
+    if never and state is WindowState.CONNECTING:
+        return CoilKnowledge.ASKED
     if coil.output is None or (not coil.output and coil.verified_off is False):
         return CoilKnowledge.UNKNOWN
     if not coil.output:
-        return CoilKnowledge.OFF
+        old = coil.read_age > HOLDS
+        return CoilKnowledge.WAS_OFF if old else CoilKnowledge.OFF
     if coil.age > STALE:
         return CoilKnowledge.UNKNOWN
     return (
@@ -208,8 +219,8 @@ def stop_truth(
 ) -> CoilKnowledge:
     """What STOP claims: where the coil is at rest, of those that were left unknown."""
     what = truth(state, coil)
-    at_rest = what in (CoilKnowledge.NONE, CoilKnowledge.OFF)
-    return CoilKnowledge.UNKNOWN if left_unknown and at_rest else what
+    driven = what in (CoilKnowledge.LIVE, CoilKnowledge.FALLING)
+    return CoilKnowledge.UNKNOWN if left_unknown and not driven else what
 
 
 def left_notice(left_unknown: tuple[str, ...]) -> FaultNotice | None:
@@ -253,7 +264,11 @@ def stop_text(
         return StopText("COIL STATE UNKNOWN", "switch off at the source")
     if what is CoilKnowledge.NONE or coil is None:
         return StopText("STOP", "no coil source")
+    if what is CoilKnowledge.ASKED:
+        return StopText("STOP", "asking the coil source")
     now = milliamperes(coil.current)
+    if what is CoilKnowledge.WAS_OFF:
+        return StopText("STOP", f"{now} read back {ago(coil)}")
     if what is CoilKnowledge.FALLING:
         return StopText("STOPPING", f"{now} → 0")
     if what is CoilKnowledge.LIVE:
@@ -266,6 +281,11 @@ def stop_text(
     if state is WindowState.FAULT:
         return StopText("COIL IS OFF", f"{now} verified")
     return StopText("STOP", f"coil is off · {now}")
+
+
+def ago(coil: CoilView) -> str:
+    """When a coil was read back, as "5 min ago"."""
+    return f"{coil.read_age / 60:.0f} min ago"
 
 
 def run_problem(snapshot: Snapshot, *, form_problem: str) -> str:

@@ -120,7 +120,8 @@ class Window(QMainWindow):
             self.review.manual.show_bench(self.session.bench.spec)
         self.centre.show_empty(
             snapshot.state is WindowState.DISCONNECTED and self.screen_.run is None,
-            self.session.bench.silent,
+            self.session.bench.refused,
+            self.session.bench.see_to,
         )
         self.centre.log.note.setPlaceholderText(self.runs.note_goes_to)
         tools = self.centre.tools

@@ -28,6 +28,9 @@ from gui.state import (
 
 WIDTH, HEIGHT = 228, 52
 
+UNDECIDED = (CoilKnowledge.ASKED, CoilKnowledge.FALLING, CoilKnowledge.WAS_OFF)
+"""What it claims in amber: not at rest for sure, nor live for sure."""
+
 
 class StopButton(QAbstractButton):
     """The biggest button of the window. It is never disabled and never moves."""
@@ -120,7 +123,7 @@ class StopButton(QAbstractButton):
             painter.setBrush(QBrush(fill))
             painter.drawRoundedRect(body, 9, 9)
             return "#FFFFFF"
-        if self._truth is CoilKnowledge.FALLING:
+        if self._truth in UNDECIDED:
             painter.setPen(QPen(QColor(look.LAMP_AMBER), 1.5))
             painter.setBrush(QColor("#3A2606"))
             painter.drawRoundedRect(body, 9, 9)
@@ -177,7 +180,7 @@ class StopButton(QAbstractButton):
         hole = {
             CoilKnowledge.UNKNOWN: look.HAZARD_YELLOW,
             CoilKnowledge.LIVE: look.STOP_RED,
-            CoilKnowledge.FALLING: "#3A2606",
+            **dict.fromkeys(UNDECIDED, "#3A2606"),
         }.get(self._truth, look.STOP_DARK_RED if self._fault else "#161F2B")
         painter.setBrush(QColor(hole))
         if self._truth is CoilKnowledge.UNKNOWN:

@@ -15,6 +15,7 @@ from gui.state import (
     CoilView,
     Snapshot,
     WindowState,
+    ago,
     milliamperes,
     truth,
 )
@@ -148,6 +149,8 @@ class ManualView(QWidget):
         self.now.setText("—" if known is None else milliamperes(known.current))
         if what is CoilKnowledge.UNKNOWN:
             self.force.setText("state unknown: look at the source")
+        elif coil is not None and what is CoilKnowledge.WAS_OFF:
+            self.force.setText(f"output off, read back {ago(coil)}")
         elif coil is None or coil.output is not True:
             self.force.setText("output off" if coil is not None else "")
         elif coil.current is None:

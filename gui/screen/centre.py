@@ -43,7 +43,7 @@ EXPLORE = (
     "Explore with the simulated bench: same drivers, same protocols, same files, no "
     "hardware. Or connect your own coil source, oscilloscope and teslameter."
 )
-SILENT = "{} is not connected. See to what did not answer, then connect it again."
+REFUSED = "{} is not connected. See to {}, then connect it again."
 
 
 class EmptyCard(QFrame):
@@ -57,7 +57,7 @@ class EmptyCard(QFrame):
 
     simulated_asked = Signal()
     again_asked = Signal()
-    """The bench that did not answer."""
+    """The bench that could not be connected."""
     connect_asked = Signal()
     open_asked = Signal()
     recent_asked = Signal(object)
@@ -69,7 +69,7 @@ class EmptyCard(QFrame):
         self._below, self._above, self._theme = parent, above, theme
         self._picture = QLabel()
         title = label("No bench connected", "big")
-        self._text = text = label(EXPLORE, wrap=True)
+        self.text = text = label(EXPLORE, wrap=True)
         self.again = push("Connect again", "primary")
         self.simulated = push("Use simulated bench", "primary")
         self._connect = connect = push("Connect instruments …")
@@ -92,12 +92,17 @@ class EmptyCard(QFrame):
         parent.installEventFilter(self)
         self.offer("")
 
-    def offer(self, silent: str) -> None:
-        """Offer the bench that did not answer, "" for none, before a simulated one."""
-        self.again.setVisible(bool(silent))
-        self.again.setToolTip(silent)
-        self.simulated.setHidden(bool(silent))  # the menu has it, too
-        self._text.setText(SILENT.format(silent) if silent else EXPLORE)
+    def offer(self, refused: str, see_to: str = "") -> None:
+        """Offer the bench that could not be connected before a simulated one.
+
+        Args:
+            refused: its name; "" for none.
+            see_to: what kept it from being connected.
+        """
+        self.again.setVisible(bool(refused))
+        self.again.setToolTip(refused)
+        self.simulated.setHidden(bool(refused))  # the menu has it, too
+        self.text.setText(REFUSED.format(refused, see_to) if refused else EXPLORE)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Stay in the middle of what it lies on."""
@@ -113,7 +118,7 @@ class EmptyCard(QFrame):
         """Lie in the middle; where there is little room, say and offer less."""
         below, minor = (
             self._below,
-            (self._hint, self._picture, self._listed, self._text),
+            (self._hint, self._picture, self._listed, self.text),
         )
         narrow = below.width() < MOST + 40
         self._connect.setText("Connect …" if narrow else "Connect instruments …")
@@ -286,14 +291,15 @@ class Centre(QWidget):
             self.stack.show_lanes(lanes)
             self.empty.raise_()  # the cards of new lanes lie above what was there
 
-    def show_empty(self, wanted: bool, silent: str = "") -> None:
+    def show_empty(self, wanted: bool, refused: str = "", see_to: str = "") -> None:
         """Show or hide the card of the empty state.
 
         Args:
             wanted: whether there is no bench, and no run on screen.
-            silent: name of the bench that did not answer; "" for none.
+            refused: name of the bench that could not be connected; "" for none.
+            see_to: what kept it from that.
         """
         self.empty.setVisible(wanted)
         if wanted:
-            self.empty.offer(silent)
+            self.empty.offer(refused, see_to)
             self.empty.place()

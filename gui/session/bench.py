@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject, Signal
 
 from gui.session.log import Log, Severity
 from gui.session.status import UNKNOWN, Status
-from gui.state import WindowState
+from gui.state import HOLDS, WindowState
 from tactile_lab.bench import OffReport
 from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.jobs import (
@@ -32,11 +32,10 @@ from tactile_lab.voltage_source import SOURCED
 if TYPE_CHECKING:
     from tactile_lab.engine.manual import FieldReading
 
-WATCH = 60.0
+WATCH = HOLDS / 2
 """Age of an answer, s, at which it is asked for anew while nothing uses the bench."""
 
-STALE = 2 * WATCH
-"""Seconds after which an answer no longer says that an instrument is there."""
+SILENT = "what did not answer"
 
 ROLES = {
     "coil": "Coil source",
@@ -56,6 +55,7 @@ class ConnectedBench(QObject):
         found: who answered; None before, and where somebody did not, or the coil
             was not verified off.
         answers: of each instrument that was asked last.
+        see_to: what keeps a bench that is not connected from being so, in words.
         overrides: ``bench.key=value`` texts that change the file.
         request: a run that needs every instrument.
         field: as read on request since the instruments were last asked or used, T.
@@ -76,6 +76,7 @@ class ConnectedBench(QObject):
         self.spec: BenchSpec | None = None
         self.found: Checked | None = None
         self.answers: tuple[InstrumentAnswer, ...] = ()
+        self.see_to = SILENT
         self.overrides: tuple[str, ...] = ()
         self.request: Request | None = None
         self.field: float | None = None
@@ -92,7 +93,7 @@ class ConnectedBench(QObject):
         self.overrides, self.found = (), None
         self.request = bench_request(choice, self.spec)
         if not self._status.coil.doubtful:  # else that stands until somebody answered
-            self._status.coil.use(None)
+            self._use(self.spec)
         self._log.add(
             Severity.INFO, "bench", f"Asking the instruments of {self.spec.name}"
         )
@@ -139,11 +140,11 @@ class ConnectedBench(QObject):
     @property
     def known(self) -> bool:
         """Whether the last answer still says that the instruments are there."""
-        return self.age is not None and self.age < STALE
+        return self.age is not None and self.age < HOLDS
 
     @property
-    def silent(self) -> str:
-        """Name of a real bench that was chosen and did not answer; "" for none."""
+    def refused(self) -> str:
+        """Name of a real bench that was chosen and is not connected; "" for none."""
         spec = self.spec if self.found is None else None
         return "" if spec is None or spec.simulated else spec.name
 
@@ -218,6 +219,14 @@ class ConnectedBench(QObject):
         self._take(reply.value)
         self._status.changed.emit()
 
+    def _use(self, spec: BenchSpec | None) -> None:
+        """Have the coil of a bench watched, of which nothing is known yet; or none."""
+        coil = None if spec is None else spec.coil
+        if spec is None or coil is None:
+            self._status.coil.use(None)
+        else:
+            self._status.coil.use(coil.limits, "" if spec.simulated else coil.port)
+
     def _take(self, found: Checked) -> None:
         self.answers, self._answered = found.found, time.monotonic()
         self.found = found if found.sound else None
@@ -247,26 +256,28 @@ class ConnectedBench(QObject):
         if found is None:
             if self.found is None:
                 self.spec = self.choice = None
-            self.found = None
+            self.found, self.see_to = None, SILENT
             status.coil.left(UNKNOWN)  # nobody looked, and somebody may be using it
             status.set_fault("The bench cannot be used.", reply.problem)
             return
         broken = [one for one in found.found if one.problem]
-        spec, asked = self.spec, any(one.role == "coil" for one in found.found)
-        if asked and spec is not None and spec.coil is not None:
-            port = "" if spec.simulated else spec.coil.port
-            status.coil.use(spec.coil.limits, port)
+        if any(one.role == "coil" for one in found.found):
+            self._use(self.spec)
+            status.coil.left(UNKNOWN)  # unless the answer below tells more
         else:
-            status.coil.use(None)
+            self._use(None)
         self._take(found)
         for one in found.found:
             if one.problem:
                 self._log.add(Severity.ERROR, one.role, one.problem)
             else:
                 self._log.add(Severity.GOOD, one.role, one.identity)
+        self.see_to = SILENT
         if found.on and found.off is not None:
+            self.see_to = "its coil, whose output was found on"
             status.set_fault("The coil's output is on.", found.off.text)
         elif found.off is not None and not found.off.verified:
+            self.see_to = "its coil, which was not verified off"
             status.set_fault("The coil's state is unknown.", found.off.text)
         elif broken:
             names = " and ".join(ROLES[one.role].lower() for one in broken)

@@ -15,6 +15,7 @@ from gui.state import (
     InstrumentView,
     Lamp,
     WindowState,
+    ago,
     limit_text,
     milliamperes,
     truth,
@@ -92,7 +93,7 @@ class Chips:
     def _coil(self, coil: CoilView | None) -> InstrumentView:
         state, name = self._status.state, ROLES["coil"]
         what = truth(state, coil)
-        if coil is None or what is CoilKnowledge.NONE:
+        if coil is None or what in (CoilKnowledge.NONE, CoilKnowledge.ASKED):
             return InstrumentView(name, *self._found("coil"))
         idle, words = self._found("coil")
         lamp = {
@@ -100,6 +101,7 @@ class Chips:
             CoilKnowledge.LIVE: Lamp.ACTIVE,
             CoilKnowledge.FALLING: Lamp.WAITING,
             CoilKnowledge.OFF: idle,
+            CoilKnowledge.WAS_OFF: Lamp.WAITING if idle is Lamp.GOOD else idle,
         }[what]
         value = "—" if coil.current is None else milliamperes(coil.current)
         sent = coil.setpoint is not None
@@ -107,6 +109,8 @@ class Chips:
             value = f"→ {milliamperes(coil.setpoint)}"
         if what is CoilKnowledge.UNKNOWN:
             return InstrumentView(name, lamp, "state unknown", "?")
+        if what is CoilKnowledge.WAS_OFF:
+            return InstrumentView(name, lamp, f"off, read back {ago(coil)}", "—")
         if what is CoilKnowledge.OFF and not self._bench.known:
             return InstrumentView(name, lamp, words, value)
         return InstrumentView(name, lamp, limit_text(coil), value)

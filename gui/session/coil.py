@@ -31,6 +31,7 @@ class CoilWatch:
         self.left_unknown: tuple[str, ...] = ()
         self._port = ""
         self._off: OffReport | None = None
+        self._off_since = time.monotonic()
         self._since = time.monotonic()
         self._sign = time.monotonic()
         self._read: float | None = NEVER
@@ -58,7 +59,7 @@ class CoilWatch:
     def left(self, off: OffReport | None) -> None:
         """The coil was switched off with this result."""
         if off is not None:
-            self._off = off
+            self._off, self._off_since = off, time.monotonic()
 
     def sign_of_life(self) -> None:
         """The source acknowledged a set-point or was read back just now."""
@@ -79,12 +80,19 @@ class CoilWatch:
         if state is None or not state.live:
             self._read = NEVER
             off = None if state is None else state.off
+            if off is not None and off is not self._off:
+                self.left(off)
             if off is None and (heard is None or heard.silent <= STALE):
                 off = self._off  # nothing was switched on: as it was left before
             if off is None:
                 return CoilView(None, limit=limit)
             return CoilView(
-                False, off.current, 0.0, verified_off=off.verified, limit=limit
+                False,
+                off.current,
+                0.0,
+                read_age=now - self._off_since,
+                verified_off=off.verified,
+                limit=limit,
             )
         if state.read != self._read:
             self._read, self._since, self._sign = state.read, now, now

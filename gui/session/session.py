@@ -6,6 +6,7 @@ window's timer calls `poll`, which hands over all that the engine told. Nothing 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -316,7 +317,10 @@ class Session(QObject):
     def coil_view(self) -> CoilView | None:
         """The coil as it is known now."""
         task = self.manual if self.manual.alive else self.run
-        return self.status.coil.view(task.coil, task.heard)
+        coil, spec = self.status.coil.view(task.coil, task.heard), self.bench.spec
+        if coil is not None and not coil.output and spec is not None and spec.simulated:
+            return replace(coil, read_age=0.0)  # nobody else can switch that on
+        return coil
 
     def snapshot(self) -> Snapshot:
         """Everything the header, banner and buttons are rendered from."""

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication
 from gui.session import coil, heard
 from gui.session.live_task import LiveTask
 from gui.session.session import Session
-from gui.state import STALE, CoilKnowledge, WindowState, stop_text, truth
+from gui.state import HOLDS, STALE, CoilKnowledge, Lamp, WindowState, stop_text, truth
 from tactile_lab.acquisition.ending import CoilState, Ending
 from tactile_lab.acquisition.events import RunState
 from tactile_lab.bench import CoilLimits, OffReport
@@ -105,6 +105,20 @@ def test_off_is_claimed_in_a_run_only_while_the_engine_tells_so(told: Told) -> N
     told.end()
     told.now += 60.0
     assert told.known is OFF
+
+
+def test_off_is_as_old_as_its_read_back(told: Told) -> None:
+    told.begin(told.session.run)
+    told.now += 600.0
+    told.tell(off=VERIFIED)
+    told.end()
+    assert told.known is OFF, "read back at the end of the run"
+    told.now += HOLDS + 1
+    assert told.known is CoilKnowledge.WAS_OFF
+    chip = told.session.snapshot().instruments[0]
+    assert chip.lamp is not Lamp.GOOD and chip.value == "—"
+    told.session.status.coil.left(VERIFIED)
+    assert told.known is OFF, "asked again"
 
 
 def test_what_an_ended_run_could_not_verify_stays_unknown_in_the_next(

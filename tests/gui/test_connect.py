@@ -12,6 +12,7 @@ from benches import READ_BY_HAND
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QPushButton
+from serial import serial_for_url
 
 from gui.dialogs.bench_text import (
     BY_PERSON,
@@ -332,6 +333,27 @@ def test_a_bench_that_did_not_answer_can_be_connected_again(lab) -> None:
     session.bench.let_go()
     window.render_state()
     assert card.simulated.isVisible() and not card.again.isVisible()
+
+
+def test_a_source_that_answered_is_not_told_as_silent(lab, source) -> None:
+    """Of one whose output was on: "See to what did not answer"."""
+    window, session = lab.window, lab.session
+    session.connect_bench(str(source.bench))
+    lab.until(lambda: session.state is WindowState.READY)
+    with serial_for_url(source.served.addresses["coil"]) as by_hand:
+        by_hand.write(b"CURR 0.3\nOUTP 1\n")
+        lab.until(lambda: source.output)
+    session.bench.look()
+    lab.until(lambda: session.state is WindowState.FAULT)
+    window.banner.acknowledge.click()
+    said = window.centre.empty.text.text()
+    assert "whose output was found on" in said and "did not answer" not in said
+    source.served.close()
+    session.connect_again()
+    lab.until(lambda: session.state is WindowState.FAULT)
+    window.banner.acknowledge.click()
+    assert "See to what did not answer" in window.centre.empty.text.text()
+    session.bench.let_go()
 
 
 def test_asking_again_makes_no_unknown_coil_known(lab) -> None:

@@ -27,6 +27,7 @@ from gui.state import (
     WindowState,
     clock_text,
     run_problem,
+    stop_text,
     truth,
 )
 from tactile_lab.acquisition.events import FieldRead, TemperatureRead, VoltageRead
@@ -95,7 +96,7 @@ def test_a_source_that_is_gone_while_idle_becomes_a_fault(
 def test_a_source_that_is_there_is_looked_at_and_stays_ready(
     served: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connected, "STALE", -1.0)
+    monkeypatch.setattr(connected, "HOLDS", -1.0)
     assert not served.snapshot().known
     assert Lamp.GOOD not in lamps(served)[:1], "an old answer says nothing of now"
     monkeypatch.undo()
@@ -124,6 +125,33 @@ def test_an_output_that_is_switched_on_by_hand_is_told_and_left_on(
     served.connect_bench(str(source.bench))
     until(served, lambda: served.state is WindowState.READY)
     assert not source.output, "connecting again makes it safe"
+
+
+def test_a_source_is_asked_before_anything_is_said_of_its_coil(
+    app: QApplication, tmp_path: Path, source: Source
+) -> None:
+    """STOP said "no coil source" until it answered, though its output may be on."""
+    session = Session(tmp_path / "runs", separate=False)
+    session.connect_bench(str(source.bench))
+    assert session.state is WindowState.CONNECTING
+    assert coil(session) is CoilKnowledge.ASKED
+    said = stop_text(session.state, session.coil_view())
+    assert said.spoken == "STOP: asking the coil source"
+    assert not {Lamp.GOOD, Lamp.ABSENT} & set(lamps(session)[:1])
+    until(session, lambda: session.state is WindowState.READY)
+    assert coil(session) is CoilKnowledge.OFF
+    session.close()
+
+
+def test_a_bench_that_nobody_could_ask_leaves_its_coil_unknown(
+    app: QApplication, tmp_path: Path, source: Source
+) -> None:
+    session = Session(tmp_path / "runs", separate=False)
+    session.connect_bench(str(source.bench))
+    source.bench.write_text("broken")
+    until(session, lambda: session.state is WindowState.FAULT)
+    assert coil(session) is CoilKnowledge.UNKNOWN, "somebody else may be using it"
+    session.close()
 
 
 def test_stop_switches_off_what_a_fault_found_on(

@@ -5,6 +5,7 @@ import pytest
 from gui.look.theme import Theme
 from gui.record.progress import ProgressStrip
 from gui.state import (
+    HOLDS,
     STALE,
     CoilKnowledge,
     CoilView,
@@ -49,6 +50,16 @@ def test_read_back_of_another_set_point_is_not_called_live() -> None:
 def test_unverified_off_is_unknown_in_every_state(state: WindowState) -> None:
     coil = CoilView(False, None, verified_off=False)
     assert truth(state, coil) is CoilKnowledge.UNKNOWN
+
+
+def test_a_verified_off_holds_for_two_minutes() -> None:
+    """It said "coil is off" for ever where nobody asks: no bench, an open fault."""
+    off = CoilView(False, 0.0, 0.0, verified_off=True, read_age=HOLDS - 1)
+    for state in WindowState.DISCONNECTED, WindowState.FAULT:
+        assert truth(state, off) is CoilKnowledge.OFF
+        old = replace(off, read_age=300.0)
+        assert truth(state, old) is CoilKnowledge.WAS_OFF
+        assert stop_text(state, old).spoken == "STOP: 0 mA read back 5 min ago"
 
 
 def test_without_coil_stop_says_so() -> None:
