@@ -22,6 +22,7 @@ from gui.dialogs.overlay import Overlay
 from gui.dialogs.question import QuestionCard
 from gui.habits import Habits
 from gui.header.header import Header
+from gui.interrupted import Interrupted
 from gui.look.theme import Theme
 from gui.parts import column
 from gui.preferences import Preferences
@@ -100,6 +101,7 @@ class Window(QMainWindow):
         self.spikes = SpikeTools(self.review.spikes, self.centre.stack, session)
         self.review.noise.follow(session)
         CursorStatistics(self.centre.stack, session)
+        self.interrupted = Interrupted(self.page, self.centre.say)
         self._leaving = False
         self.apart: LanesWindow | None = None
         self._connect()
@@ -156,6 +158,7 @@ class Window(QMainWindow):
         """Fold a side panel by hand; the window's width no longer decides."""
         self._folds[side] = folded
         side.setVisible(not folded)
+        self.interrupted.end()  # who folds a field away types on in none
         if not folded and self.width() < NARROW:  # there is room for one of them
             other = self.setup if side is self.review else self.review
             other.setVisible(False)
@@ -267,11 +270,12 @@ class Window(QMainWindow):
         if cards:
             card = cards[-1].card
             return move_on([card, self.header], card, forward=forward)
+        self.interrupted.mind()
         return move_on([self.page], self.page, forward=forward)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Take the single-key shortcuts."""
-        if not self.actions_.take_key(event):
+        """Take the single-key shortcuts, but none meant for a field that has gone."""
+        if not (self.interrupted.takes(event) or self.actions_.take_key(event)):
             super().keyPressEvent(event)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:

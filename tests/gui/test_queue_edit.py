@@ -85,6 +85,37 @@ def test_edits_of_a_run_that_starts_or_goes_are_kept_in_the_form(
     idle(lab)
 
 
+def test_what_is_typed_on_as_a_field_goes_acts_on_nothing(lab, monkeypatch) -> None:
+    """Of "95 mN" the m switched the model off and the N went to the notes."""
+    session, setup, window = lab.session, lab.window.setup, lab.window
+    monkeypatch.setattr(session, "start", lambda *asked: None)
+    three_waiting(lab)
+    for ended in (
+        lambda: QTest.keyClick(window.windowHandle(), Qt.Key.Key_Return),
+        lambda: QTest.mouseClick(window.centre.stack.scene, Qt.MouseButton.LeftButton),
+    ):
+        setup.edit(session.queue.items[0])
+        lab.app.processEvents()
+        field = setup.form.field("levels").findChild(QLineEdit)
+        field.setFocus()
+        lab.until(field.hasFocus)
+        session.status.enter(WindowState.READY)
+        session.queue.resume()
+        twin, notice = window.centre.tools.twin, window.centre.notice
+        shown = twin.isChecked()
+        for key in "95 mN":
+            QTest.keyClick(window.windowHandle(), key)
+        assert twin.isChecked() is shown and not window.centre.log.note.hasFocus()
+        assert "has gone" in notice.text()
+        ended()
+        assert notice.isHidden()
+        QTest.keyClick(window.windowHandle(), "m")
+        assert twin.isChecked() is not shown, "by somebody who means it"
+        twin.setChecked(shown)
+        busy(lab)
+    idle(lab)
+
+
 def test_edit_that_cannot_run_is_not_saved(lab) -> None:
     session, setup = lab.session, lab.window.setup
     three_waiting(lab)
