@@ -309,6 +309,7 @@ class Window(QMainWindow):
         for line in session.log.lines:  # the bench may have been asked already
             self.centre.log.add(line)
         session.log.added.connect(self.centre.log.add)
+        session.log.told.connect(self.centre.say)
         session.plan.arrived.connect(self.screen_.plan_arrived)
         session.source_changed.connect(self.screen_.follow_run)
         session.run.trial_ended.connect(self.screen_.trial_ended)

@@ -188,11 +188,12 @@ class ConnectedBench(QObject):
         self.reading, found = False, reply.value
         if found is None:
             words = f"The field was not read: {reply.problem}"
-            self._log.add(Severity.ERROR, "meter", words)
+            self._log.tell(Severity.ERROR, "meter", words)
         else:
             self.field = found.mean
             mean, spread = show(found.mean, "T", 4), show(found.spread, "T", 2)
             self._log.add(Severity.INFO, "meter", f"Field {mean} ± {spread}")
+            self._log.told.emit("")
         self._status.changed.emit()
 
     def confirm(self) -> None:

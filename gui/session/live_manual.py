@@ -57,7 +57,7 @@ class LiveManual(LiveTask):
             self._status.coil.sign_of_life()
             self._see(event)
         elif isinstance(event, Message):
-            self._log.add(Severity.WARNING, "coil", event.text)
+            self._log.tell(Severity.WARNING, "coil", event.text)
         elif isinstance(event, Samples):
             self.say(renew)
 

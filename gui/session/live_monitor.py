@@ -79,7 +79,7 @@ class LiveMonitor(LiveTask):
             self._status.lose_engine()
         elif ending.state is events.RunState.REFUSED:
             words = f"The monitor was refused. {ending.reason}"
-            self._log.add(Severity.ERROR, "monitor", words)
+            self._log.tell(Severity.ERROR, "monitor", words)
         elif ending.state is events.RunState.FAULTED:
             self._status.set_fault("The monitor ended.", ending.reason or "")
         self.ended.emit()
@@ -100,7 +100,8 @@ class LiveMonitor(LiveTask):
     def _recorded(self, reply: Reply[Path]) -> None:
         self.recording = False
         if reply.value is None:
-            self._log.add(Severity.ERROR, "monitor", f"Not recorded: {reply.problem}")
+            words = f"Not recorded: {reply.problem}"
+            self._log.tell(Severity.ERROR, "monitor", words)
         else:
             self._log.add(Severity.GOOD, "monitor", f"Recorded to {reply.value}")
             self.recorded.emit(reply.value)

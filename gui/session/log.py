@@ -52,6 +52,8 @@ class Log(QObject):
     """Lines, the oldest first."""
 
     added = Signal(object)
+    told = Signal(str)
+    """Is to be seen where the log is not, too; "" takes it away."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -73,3 +75,11 @@ class Log(QObject):
         self.lines.append(line)
         del self.lines[:-KEPT]
         self.added.emit(line)
+
+    def tell(self, level: Severity, source: str, text: str) -> None:
+        """Put a line into the log of what somebody asked for and does not get.
+
+        A low window does not show the log: this is to be seen above the lanes, too.
+        """
+        self.add(level, source, text)
+        self.told.emit(text)

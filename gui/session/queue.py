@@ -143,7 +143,7 @@ class Queue(QObject):
             f"{item.title} was queued for {item.request.bench}, which is not connected."
             " Connect that, or edit and save it for the bench that is."
         )
-        self._log.add(Severity.ERROR, "queue", words)
+        self._log.tell(Severity.ERROR, "queue", words)
         self.hold()
 
     def _planned(self, item: Queued, asked: Request, reply: Reply[Expectation]) -> None:
@@ -154,6 +154,6 @@ class Queue(QObject):
         if reply.value is None:
             self.items.remove(item)
             item.left = f"was taken out of the queue: {reply.problem}"
-            self._log.add(Severity.ERROR, "queue", f"{item.title} {item.left}")
+            self._log.tell(Severity.ERROR, "queue", f"{item.title} {item.left}")
         self.changed.emit()
         self.next()

@@ -203,7 +203,7 @@ class Session(QObject):
             self.queue.resume()
         elif self.queue.items:
             self.queue.hold()
-            self.log.add(Severity.WARNING, "queue", f"Nothing starts. {reason}")
+            self.log.tell(Severity.WARNING, "queue", f"Nothing starts. {reason}")
 
     def begin_manual(self) -> None:
         """Open the coil source to drive it by hand."""

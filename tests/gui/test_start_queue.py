@@ -41,6 +41,8 @@ def test_a_bench_that_is_connected_drives_nothing(lab, started) -> None:
     session.disconnect_bench()
     ask(lab)
     assert session.log.lines[-1].text == "Nothing starts. Connect a bench first."
+    seen = lab.window.centre.notice
+    assert seen.isVisible() and "Connect a bench" in seen.text(), "low windows: no log"
     session.connect_bench("sim")
     nothing_begins_later(lab, started)
 
