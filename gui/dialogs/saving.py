@@ -9,8 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PySide6.QtCore import QBuffer, QPointF, QRect, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QImage, QPainter, QStaticText, QTransform
+from PySide6.QtCore import QBuffer, QByteArray, QPointF, QRect, QRectF, QSize, Qt
+from PySide6.QtGui import (
+    QColor,
+    QFont,
+    QImage,
+    QImageWriter,
+    QPainter,
+    QStaticText,
+    QTransform,
+)
 from PySide6.QtSvg import QSvgGenerator
 
 from gui.ask_file import ask_file
@@ -79,17 +87,31 @@ def write_view(panels: Panels, path: Path) -> None:
     if bar.comparison is not None and bar.comparison is stack.source:
         title += f", {bar.comparison.layout.value}"
     title += " · SIMULATED" if stack.source.simulated else " · measured"
-    with _telling(panels, "export", path), replacing(path) as part:
-        ending = path.suffix.lower()
-        if ending == ".csv":
-            part.write_bytes(table(stack, title).encode())
-        elif ending == ".svg":
-            part.write_bytes(_svg(stack, title))
-        elif not picture(stack, title).save(str(part)):
-            raise RecordingError(
-                "no picture can be written there. End it in .png, or "
-                "choose another folder or disk."
-            )
+    with _telling(panels, "export", path):
+        data = _exported(stack, title, path.suffix.lower())
+        with replacing(path, len(data)) as part:
+            part.write_bytes(data)
+
+
+def _exported(stack: LaneStack, title: str, ending: str) -> bytes:
+    """What a file of that ending holds.
+
+    Raises:
+        RecordingError: no picture has that ending.
+    """
+    if ending == ".csv":
+        return table(stack, title).encode()
+    if ending == ".svg":
+        return _svg(stack, title)
+    kind = QByteArray(ending[1:].encode())
+    if kind not in QImageWriter.supportedImageFormats():
+        raise RecordingError(
+            f"no picture ends in {ending!r}. End it in .png, .svg or .csv."
+        )
+    written = QBuffer()
+    written.open(QBuffer.OpenModeFlag.WriteOnly)
+    QImageWriter(written, kind).write(picture(stack, title))
+    return bytes(written.data().data())
 
 
 @contextmanager

@@ -163,6 +163,7 @@ def test_view_is_exported(lab) -> None:
         assert not notice.isVisible()
         with full_after(50):
             write_view(window.panels, file)
+            assert "File too large" in notice.text(), "of a picture: End it in .png"
             write_scene(window.panels, folder / "saved.toml")
         assert "not saved" in window.session.log.lines[-1].text
         assert file.read_bytes() == before[file]
