@@ -310,6 +310,7 @@ class Window(QMainWindow):
             self.centre.log.add(line)
         session.log.added.connect(self.centre.log.add)
         session.log.told.connect(self.centre.say)
+        self.setup.star.asked.connect(self.runs.confirm.ask)
         session.plan.arrived.connect(self.screen_.plan_arrived)
         session.source_changed.connect(self.screen_.follow_run)
         session.run.trial_ended.connect(self.screen_.trial_ended)

@@ -20,9 +20,16 @@ from tactile_lab.whole_file import failing_as
 
 
 class PresetButton(IconButton):
-    """A filled star while the form shows one of its protocol's presets."""
+    """A filled star while the form shows one of its protocol's presets.
+
+    Attributes:
+        name: of a new one, in the menu that was opened last.
+    """
 
     failed = Signal(str)
+    asked = Signal(str, str, str, object)
+    """Before one is replaced or deleted: question, what is lost, the answer for which
+    the last is done."""
 
     def __init__(
         self, theme: Theme, form: Form, folder: Path, request: Callable[[], Request]
@@ -39,6 +46,7 @@ class PresetButton(IconButton):
         self.set_icon("starred" if shown else "star")
         words = f"Preset: {shown}" if shown else "Presets of this protocol"
         self.setToolTip(words)
+        self.setAccessibleName(words)
 
     def shown(self) -> str:
         """Name of the preset that the form shows, "" for none."""
@@ -52,9 +60,21 @@ class PresetButton(IconButton):
         return ""
 
     def save(self, name: str) -> None:
-        """Keep the form's parameters."""
+        """Keep the form's parameters; where a preset has that name, ask first."""
+        name = name.strip()
+        if name not in self._presets() or name == self.shown():
+            self._save(name)
+            return
+        self.asked.emit(
+            f"Replace the preset “{name}”?",
+            "What it holds now is lost; the form keeps what stands in it.",
+            "Replace it",
+            partial(self._save, name),
+        )
+
+    def _save(self, name: str) -> None:
         try:
-            save_preset(self._folder, name.strip(), self._request().load())
+            save_preset(self._folder, name, self._request().load())
         except (TactileLabError, FieldError) as error:
             self.failed.emit(str(error))
         self.mark()
@@ -94,12 +114,20 @@ class PresetButton(IconButton):
             menu.addSeparator()
             out = menu.addMenu("Delete")
             for name, file in found.items():
-                out.addAction(name, partial(self._delete, file))
+                out.addAction(name, partial(self._ask_to_delete, name, file))
         return menu
 
     def _save_and_close(self, menu: QMenu) -> None:
         menu.close()
         self.save(self.name.text())
+
+    def _ask_to_delete(self, name: str, file: Path) -> None:
+        self.asked.emit(
+            f"Delete the preset “{name}”?",
+            f"{file} goes for good; the form keeps what stands in it.",
+            "Delete it",
+            partial(self._delete, file),
+        )
 
     def _delete(self, file: Path) -> None:
         try:

@@ -32,6 +32,7 @@ def test_star_keeps_marks_and_takes_up_parameters(lab) -> None:
     setup.form.propose({"hold": "700 ms"})
     setup.star.save("a bit longer")
     assert setup.star.shown() == "a bit longer"
+    assert setup.star.accessibleName() == "Preset: a bit longer"
     setup.form.edits.undo()
     assert setup.form.texts() == before and setup.star.shown() == ""
     (file,) = (lab.folder / "presets" / "pulses").iterdir()
@@ -45,6 +46,36 @@ def test_star_keeps_marks_and_takes_up_parameters(lab) -> None:
     setup.star.name.returnPressed.emit()
     assert "cannot be called" in setup.problem.text()
     setup.plan_now()
+
+
+def test_no_preset_is_replaced_or_deleted_without_a_question(lab) -> None:
+    """Its name typed again was enough, and one entry of a menu below the names."""
+    setup, question = lab.window.setup, lab.window.runs.confirm
+    star = setup.star
+    setup.form.propose({"hold": "600 ms"})
+    star.save("asked of")
+    (file,) = (lab.folder / "presets" / "pulses").glob("asked of.toml")
+    assert not question.isVisible(), "a new one"
+    star.save("asked of")
+    assert not question.isVisible(), "the same again"
+    setup.form.propose({"hold": "650 ms"})
+    star.save("asked of ")
+    assert parameters(file)["hold"] == 0.6 and question.isVisible()
+    question.leave.click()
+    assert parameters(file)["hold"] == 0.6
+    star.save("asked of")
+    question.do.click()
+    assert parameters(file)["hold"] == 0.65 and star.shown() == "asked of"
+    for answer, there in (question.leave, True), (question.do, False):
+        menu = star.menu_of_presets()
+        (out,) = (one.menu() for one in menu.actions() if one.text() == "Delete")
+        (entry,) = (one for one in out.actions() if one.text() == "asked of")
+        entry.trigger()
+        assert file.exists() and question.isVisible()
+        answer.click()
+        assert file.exists() is there
+    setup.form.edits.undo()
+    setup.form.edits.undo()
 
 
 def test_what_a_preset_cannot_do_leaves_the_form_as_it_is(lab) -> None:
