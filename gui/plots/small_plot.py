@@ -11,6 +11,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QWheelEvent
 
 from gui.look.theme import Theme
+from gui.parts import column, label
 from gui.plots.panel_item import FOOT, LOW, PanelItem
 from tactile_lab.plot import Plot
 
@@ -20,6 +21,8 @@ LINE = 15
 """Height of a line of text below a panel, px."""
 AIR = 6
 """Height above a plot without a heading, for the number at the end of its axis, px."""
+BESIDE = 10
+"""Margin of the words where there is no plot, px."""
 RIGHT = 14
 """Margin on the right, px: half of a number at the end of an axis."""
 
@@ -48,6 +51,9 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self._theme, self.nothing, self._fixed = theme, nothing, height
         self.plot: Plot | None = None
         self._told = pickle.dumps((None, nothing))
+        self._words = label(nothing, "small", wrap=True)
+        self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        column(self.viewport(), self._words, margin=BESIDE)
         self.panels: list[PanelItem] = []
         self.tell: Callable[[int], str] = lambda number: ""
         self.setFixedHeight(height) if height else self.setMinimumHeight(PANEL)
@@ -102,9 +108,9 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             shiboken6.delete(panel)
         self.panels, plot, tokens = [], self.plot, self._theme.tokens
         self.setBackground(tokens.sunken if self._fixed else tokens.panel)
+        self._words.setText(self.nothing)
+        self._words.setVisible(plot is None)
         if plot is None:
-            words = self.nothing.replace("\n", "<br>")
-            self.addLabel(words, color=tokens.muted, size="11px")
             return
         for row, height in enumerate(_heights(plot)):
             last = plot.beside or row == len(plot.panels) - 1

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QApplication
 from gui.look.theme import Theme
 from gui.plots.axis import RoundAxis, guarded
 from gui.plots.small_plot import SmallPlot
+from tactile_lab.measurement import BETWEEN_SAMPLES
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
 
 
@@ -37,6 +38,25 @@ def test_a_legend_is_not_painted_over_the_heading(app, names):
     bare = [""] * len(names)
     assert painted(app, names, label) == painted(app, bare, label)
     assert painted(app, names, legend) != painted(app, bare, legend)
+
+
+def test_the_words_where_there_is_no_plot_are_whole(app):
+    """Of a long reason in one line both ends lay outside a narrow panel."""
+    view = SmallPlot(Theme("light"), f"No rates: {BETWEEN_SAMPLES}.")
+    view.resize(260, 200)
+    image = view.grab().toImage()
+    inked = [
+        x
+        for x in range(260)
+        for y in range(200)
+        if image.pixel(x, y) != image.pixel(1, 1)
+    ]
+    assert max(inked) < 255 and min(inked) > 4
+    view.show_plot(rates(1.0))
+    drawn = view.grab().toImage()
+    view.nothing = "Something else."
+    view.draw()
+    assert view.grab().toImage() == drawn, "words lie over no plot"
 
 
 def rates(top: float) -> Plot:
