@@ -134,7 +134,7 @@ class SkinWindow(QWidget):
         self.slider.valueChanged.connect(self._slid)
         self.raster.picked.connect(self.show_time)
         self.play.toggled.connect(self._toggled)
-        QShortcut(QKeySequence("Space"), self).activated.connect(self.play.toggle)
+        QShortcut(QKeySequence("Space"), self).activated.connect(self.play.click)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._look)
         self._timer.start(FRAME)

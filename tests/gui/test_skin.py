@@ -67,6 +67,23 @@ def test_trains_come_while_it_is_computed_and_are_played_after(lab, folder, even
     assert film.dots.seen == events.time.shape[0]
 
 
+def test_space_plays_nothing_while_it_is_computed(lab, folder, events):
+    """The button showed "pause", and the film began by itself later."""
+    window = open_skin(folder / "ball.toml", folder / "spaced")(
+        lab.window.panels.theme, None
+    )
+    window._timer.stop()  # it hears of nothing that is computed meanwhile
+    window.show()
+    lab.until(window.isActiveWindow)
+    QTest.keyClick(window.windowHandle(), Qt.Key.Key_Space)
+    assert not window.play.isChecked()
+    window._timer.start()
+    lab.until(lambda: window.film is not None)
+    QTest.keyClick(window.windowHandle(), Qt.Key.Key_Space)
+    assert window.play.isChecked()
+    window.close()
+
+
 def test_the_map_shows_the_spikes_before_the_moment(lab, folder, events):
     window = shown(lab, folder / "pressed", folder)
     film = window.film
