@@ -176,16 +176,20 @@ def test_a_missing_report_is_written_where_it_is_looked_for(
     window.screen_.open_run(folder)
     lab.until(lambda: lab.session.opened == (folder.name,))
     button, writer = window.review.results.report, tmp_path / "writer"
+    let = tmp_path / "let it write"  # or it may be done before anybody has looked
     monkeypatch.setattr(sys, "executable", str(writer))
     for writes, then in (
         ("echo no room >&2; exit 3", "Write report"),
         ('echo well > "$4/report.html"', "Open report"),
     ):
-        writer.write_text(f"#!/bin/sh\n{writes}")
+        let.unlink(missing_ok=True)
+        waits = f'while [ ! -e "{let}" ]; do sleep 0.01; done'
+        writer.write_text(f"#!/bin/sh\n{waits}\n{writes}")
         writer.chmod(0o700)
         assert button.text() == "Write report" and button.isEnabled()
         button.click()
         assert "Writing" in button.text() and not button.isEnabled()
+        let.touch()
         lab.until(button.isEnabled)
         assert button.text() == then
     (failed,) = (one.text for one in lab.session.log.lines if "no room" in one.text)
