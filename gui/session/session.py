@@ -98,6 +98,8 @@ class Session(QObject):
         self.source: LiveSource | None = None
         self.unkept = ""
         self._after_monitor: tuple[Request, str, Expectation | None] | None = None
+        self._refused = False
+        self.status.changed.connect(self._forget_refusal)
         self.status.faulted.connect(self.queue.hold)
         self.bench.ready.connect(self.queue.next)
         self.run.completed.connect(self.queue.next)
@@ -204,6 +206,13 @@ class Session(QObject):
         elif self.queue.items:
             self.queue.hold()
             self.log.tell(Severity.WARNING, "queue", f"Nothing starts. {reason}")
+            self._refused = True
+
+    def _forget_refusal(self) -> None:
+        """What kept the queue from starting is in its way no more."""
+        if self._refused and self._free:
+            self._refused = False
+            self.log.told.emit("")
 
     def begin_manual(self) -> None:
         """Open the coil source to drive it by hand."""

@@ -30,6 +30,7 @@ def ask(lab) -> None:
 def nothing_begins_later(lab, started: list[str]) -> None:
     lab.until(lambda: lab.session.state is WindowState.READY)
     assert started == [], "the coil would be driven, unasked"
+    assert lab.window.centre.notice.isHidden(), "what was in the way is not any more"
     lab.window.render_state()
     assert lab.window.setup.queue.resume.isVisible(), "it can be started now"
     ask(lab)
