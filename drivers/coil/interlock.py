@@ -120,9 +120,13 @@ class Interlock:
         self._looked = -math.inf
 
     def flows(self, time: float, setpoint: float | None, *, on: bool) -> None:
-        """From `time` (s) on the set-point is `setpoint` (A), None if unknown."""
+        """From `time` (s) on the set-point is `setpoint` (A), None if unknown.
+
+        What deviated before still counts: of a short hold one reading comes.
+        """
         if setpoint != self._setpoint:
             self._changed = time
+        if not on:
             self._readback = ReadbackCheck()
         self._setpoint, self._list = setpoint, None
         if setpoint is not None:
@@ -262,7 +266,7 @@ class HeatBudget:
 
 @dataclass
 class ReadbackCheck:
-    """Trips when the measured current keeps differing from a steady set-point."""
+    """Trips when the measured current keeps differing from what is set."""
 
     deviating: int = 0
 

@@ -216,6 +216,23 @@ def test_an_open_circuit_trips(bench):
     assert not far.output_on
 
 
+def test_an_open_circuit_trips_where_the_set_point_never_rests_long(bench):
+    """Of a hold of half a second one reading comes: a run of many saw no current."""
+    clock, _plant, far, coil = bench
+    coil.open()
+    coil.energise()
+    far.switch(False)
+    with pytest.raises(InterlockError, match="0 A flows, 3 readings in a row"):
+        for _ in range(3):
+            play(clock, coil, [0.3] * 10)
+            clock.sleep_until(clock.now() + 0.25)
+            coil.read_current()
+            play(clock, coil, [0.0] * 10)
+            clock.sleep_until(clock.now() + 0.25)
+            coil.read_current()
+    assert not far.output_on and far.setpoint == 0.0
+
+
 @pytest.mark.parametrize(
     ("done", "why"),
     [
