@@ -1,5 +1,8 @@
-"""Do source, shunt and teslameter tell of one current? Asked at the end of each trial.
+"""Do source, shunt and teslameter tell of the current asked for? At a trial's end.
 
+A source whose answers come late again and again climbs so slowly that a hold is over
+before its current is reached, and one that is set or switched off at its panel is not
+switched off by the driver within a second: the run would hold a force of another name.
 The source's own read-back cannot know what its current does: a magnet that has moved,
 an unplugged winding of two, a probe that has slipped or a dead shunt change the force,
 or what is recorded of it, and nothing else. What is not measured is not compared. Where
@@ -20,9 +23,14 @@ from tactile_lab.bench import Reading
 from tactile_lab.magnetics import ROUGH
 from tactile_lab.quantity import show
 from tactile_lab.trial import Trial
+from tactile_lab.waveform import Waveform
 
 SETTLING = 0.3
 """Time after the start of a hold from which field and current must agree, s."""
+
+REACHED = 0.15
+"""Time after the start of a hold from which its current must flow, s; a source is read
+back 0.25 s after its last set-point."""
 
 STEADY = 0.02
 """Change of the current during a hold, as a part of it, up to which it is steady."""
@@ -58,6 +66,7 @@ class DriveCheck:
     def doubts(
         self,
         trial: Trial,
+        asked: Waveform | None,
         current: FloatArray,
         shunt: Callable[[float, float], float | None],
         readings: Iterable[Reading],
@@ -66,6 +75,8 @@ class DriveCheck:
 
         Args:
             trial: that was played.
+            asked: current that it asks for, A against s from its start; None where
+                no coil plays it.
             current: as read back, shape (n, 2), s from its start and A.
             shunt: mean current, A, of the scope's channel between two times of the
                 trial, s; None where it has none.
@@ -74,14 +85,31 @@ class DriveCheck:
         if trial.hold is None:
             return []
         begin, end = trial.hold[0] + SETTLING, trial.hold[1]
+        found = []
+        if asked is not None:
+            found.append(("asked", _held(asked, current, trial.hold)))
         held = current[(current[:, 0] >= begin) & (current[:, 0] <= end)]
-        steady = held.size and np.ptp(held[:, 1]) <= STEADY * np.abs(held[:, 1]).max()
+        steady = _steady(held[:, 1])
         if not steady:
             begin, end = _moving(current, trial.length)
             held = current[(current[:, 0] >= begin) & (current[:, 0] <= end)]
-        if held.size == 0:
-            return []
-        amperes = float(np.interp(np.linspace(begin, end, GRID), *held.T).mean())
+        if held.size:
+            found += self._beside(trial, held, (begin, end), steady, shunt, readings)
+        new = [(what, text) for what, text in found if text and what not in self._told]
+        self._told.update(what for what, _ in new)
+        return [f"{trial.label}: {text}" for _, text in new]
+
+    def _beside(
+        self,
+        trial: Trial,
+        held: FloatArray,
+        window: tuple[float, float],
+        steady: bool,
+        shunt: Callable[[float, float], float | None],
+        readings: Iterable[Reading],
+    ) -> list[tuple[str, str]]:
+        """What to say of field and shunt beside the current of that window, s."""
+        begin, end = window
         found = []
         pairs = [
             (np.interp(one.time - LAGS, *held.T), one.value)
@@ -96,10 +124,9 @@ class DriveCheck:
             found.append(("field", self._field(pairs)))
         seen = shunt(begin, end)
         if seen is not None:
+            amperes = float(np.interp(np.linspace(begin, end, GRID), *held.T).mean())
             found.append(("shunt", _shunt(amperes, seen)))
-        new = [(what, text) for what, text in found if text and what not in self._told]
-        self._told.update(what for what, _ in new)
-        return [f"{trial.label}: {text}" for _, text in new]
+        return found
 
     def _field(self, pairs: list[tuple[FloatArray, float]]) -> str:
         """What to say of readings, T, beside the current at each of `LAGS`, A."""
@@ -118,6 +145,33 @@ class DriveCheck:
             "they are called. Check probe, sign and range of the teslameter, coil and "
             "calibration."
         )
+
+
+def _steady(amperes: FloatArray) -> bool:
+    """Whether a current, shape (n,), hardly changes; not where nothing is known."""
+    return bool(amperes.size and np.ptp(amperes) <= STEADY * np.abs(amperes).max())
+
+
+def _held(asked: Waveform, current: FloatArray, hold: tuple[float, float]) -> str:
+    """What to say of a steady current that was not given all through a hold, s."""
+    begin, end = hold[0] + REACHED, hold[1]
+    if begin >= end:
+        return ""
+    wanted = asked.at(np.linspace(begin, end, GRID))
+    first = max(int(np.searchsorted(current[:, 0], begin, side="right")) - 1, 0)
+    given = current[first : np.searchsorted(current[:, 0], end, side="right"), 1]
+    if not _steady(wanted) or given.size == 0:
+        return ""
+    level = float(wanted.mean())
+    farthest = float(given[np.argmax(np.abs(given - level))])
+    if shunt_agrees(farthest, level):
+        return ""
+    return (
+        f"it asks for {show(level, 'A')} in its hold, and the source gave "
+        f"{show(farthest, 'A')}: the force is not what it is called. The source "
+        "answers too late to climb in time, was set or switched off by hand, or the "
+        "circuit is open. Check link, front panel and leads."
+    )
 
 
 def _moving(current: FloatArray, length: float) -> tuple[float, float]:

@@ -41,6 +41,7 @@ from tactile_lab.errors import (
 )
 from tactile_lab.scope import Stream
 from tactile_lab.trial import Outcome, Trial
+from tactile_lab.waveform import Waveform
 
 BASELINE = 0.1
 """Seconds of rest recorded before the first trial and after each recovery."""
@@ -216,7 +217,8 @@ class Runner:
             self._pump.until(lambda: not (coil.plays_list or coil.overdue))
         self._note_edges(shown)
         current = self._account.applied_since(begin)
-        self._compare(trial, start, shown, current)
+        asks = None if drive is None else drive.current
+        self._compare(trial, asks, start, shown, current)
         ended = self.intake.sampled(start + trial.length)
         spikes = self.intake.spikes_between(shown, ended)
         return Outcome(
@@ -234,9 +236,14 @@ class Runner:
         )
 
     def _compare(
-        self, trial: Trial, start: float, shown: float, current: FloatArray
+        self,
+        trial: Trial,
+        asks: Waveform | None,
+        start: float,
+        shown: float,
+        current: FloatArray,
     ) -> None:
-        """Warn where current, shunt and field of the trial do not fit together."""
+        """Warn where what a trial asks for, current, shunt and field do not fit."""
         readings = self._account.fields_since(start)
         check = self._program.drive_check
         if check is None:
@@ -247,7 +254,7 @@ class Runner:
         def shunt(begin: float, end: float) -> float | None:
             return self._live.levels(shown + begin, shown + end).get("coil_current")
 
-        for text in check.doubts(trial, current, shunt, readings):
+        for text in check.doubts(trial, asks, current, shunt, readings):
             self._account.warn(text)
 
     @property

@@ -1,4 +1,4 @@
-"""A field or a shunt that does not fit the current is told, once, whatever it is."""
+"""What does not fit the current asked for is told, once, whatever it is."""
 
 import re
 
@@ -6,7 +6,9 @@ import pytest
 from short_runs import SHORT
 
 from sim_backend.bench import open_bench
-from tactile_lab.acquisition.events import Message, RunState
+from sim_backend.serial_line import wires
+from sim_backend.serial_line.faults import SerialFault
+from tactile_lab.acquisition.events import CoilCurrent, Message, RunState
 from tactile_lab.bench import Reading
 from tactile_lab.planning.needs import needs
 
@@ -54,6 +56,37 @@ def test_a_short_hold_with_a_short_rest_is_not_doubted(run_scene):
     """The shunt's mean ended with the trial, that of the read-back 0.2 s later."""
     short = ("protocol.hold=0.3 s", "protocol.rest=0.1 s")
     assert warnings(run_scene(*SHORT, *short, MEASURED)) == []
+
+
+FORCE = 'record.signals=["force"]'
+
+
+def test_a_current_that_a_late_source_never_reached_is_told(run_scene):
+    """Each late answer may mean a late step, so that the next one must be small."""
+    late = SerialFault(kind="late", amount=0.15, times=None, line=r"^CURR 0\.\d*[1-9]")
+
+    def slow(scene):
+        return open_bench(scene, needs(scene), coil_faults=[late])
+
+    told = warnings(run_scene(*SHORT, FORCE, bench=slow))
+    assert any(
+        "it asks for 996.9 mA in its hold, and the source gave" in t for t in told
+    )
+
+
+@pytest.mark.parametrize("hold", ["0.45 s", "0.8 s"])
+@pytest.mark.parametrize("amperes", [0.0, 1.5])
+def test_a_source_set_by_hand_in_a_short_hold_is_told(run_scene, amperes, hold):
+    """The driver wants three readings that deviate, and the hold is over before."""
+
+    def by_hand(execution, event):
+        if isinstance(event, CoilCurrent) and event.setpoint > 0.99:
+            far = [far for name, far in wires._far_ends.items() if "coil" in name][-1]
+            far.instrument.set_current(amperes)
+
+    ran = run_scene(*SHORT, f"protocol.hold={hold}", FORCE, watch=by_hand)
+    (told,) = warnings(ran)
+    assert "200 mN: it asks for 996.9 mA in its hold, and the source gave" in told
 
 
 @pytest.mark.parametrize("factor", [0.5, 0.0, -1.0, 2.0])
