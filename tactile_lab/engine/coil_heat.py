@@ -95,6 +95,17 @@ class CoilHeat:
         left = steady - time.monotonic() if same else wall - time.time()
         return min(max(left, 0.0), self._longest)
 
+    def check(self) -> None:
+        """Refuse where how warm the coil is cannot be told, or cannot be kept later.
+
+        Raises:
+            LimitError: the file is not one that this program writes, or its folder
+                cannot be written.
+        """
+        self.left()
+        with self._held():
+            pass
+
     @contextmanager
     def heating(self) -> Iterator[bool]:
         """While the coil is driven; `keep` says before the end how it is left.

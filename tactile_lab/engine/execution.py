@@ -105,7 +105,7 @@ class Execution(Task[Executed]):
         self._check_somebody_is_there()
         self._heat = CoilHeat.of(scene, used)
         if self._heat is not None:
-            self._heat.left()  # what cannot be told is refused here
+            self._heat.check()
         self._search = SpikeSearch.of(scene, self.needs.detect_on)
         self._recorder: Recorder | None = None
         self._runner: Runner | None = None

@@ -214,6 +214,17 @@ def test_a_broken_file_is_refused_before_a_run_is_made(
     assert not (tmp_path / "runs").exists()
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="needs a folder nobody can write")
+def test_a_state_folder_that_cannot_be_written_is_refused_before_a_run_is_made(
+    source: Source, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """It was a coil left unknown, exit code 4, and a run that counted as killed."""
+    monkeypatch.setenv("XDG_STATE_HOME", "/proc/nobody")
+    with pytest.raises(LimitError, match="Let XDG_STATE_HOME name a folder"):
+        Execution(load("demo", SHORT, str(source.bench)), tmp_path / "runs")
+    assert not (tmp_path / "runs").exists()
+
+
 def test_a_run_that_never_reached_its_coil_leaves_it_cold(
     source: Source, tmp_path: Path
 ):
