@@ -6,6 +6,7 @@ Only hardware is a real interlock; these catch mistakes, not broken electronics.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
@@ -37,6 +38,9 @@ NO_RESISTANCE = 0.05
 
 STEADY = 0.1
 """Time after a change of the set-point from which read-back must agree, s."""
+
+MOVED = 0.3
+"""Time by which a measured current may lag behind a set-point that moves, s."""
 
 LAG = 0.02
 """Time by which the measured current may lag behind a list, s."""
@@ -114,6 +118,8 @@ class Interlock:
         self._warn = warn
         self._readback = ReadbackCheck()
         self._setpoint: float | None = None
+        self._moves: deque[tuple[float, float]] = deque()
+        """Known set-points and from when on, of the last `MOVED` s; s and A."""
         self._list: tuple[CurrentList, float, float] | None = None
         self._player = LIST
         self._changed = time
@@ -129,7 +135,12 @@ class Interlock:
         if not on:
             self._readback = ReadbackCheck()
         self._setpoint, self._list = setpoint, None
+        if setpoint is None or not on:
+            self._moves.clear()
         if setpoint is not None:
+            self._moves.append((time, setpoint))
+            while len(self._moves) > 1 and self._moves[1][0] <= time - MOVED:
+                self._moves.popleft()
             self.heat.flow(time, setpoint if on else 0.0)
 
     def plays(
@@ -177,12 +188,12 @@ class Interlock:
             points, earliest, latest = self._list
             within = points.between(asked - latest - LAG, time - earliest)
             return self._readback.list_complaint(within, measured, self._player)
-        if self._setpoint is None or time - self._changed <= STEADY:
+        if self._setpoint is None:
             return None
-        why = self._readback.complaint(
-            self._setpoint, measured, self._limits.compliance
-        )
-        due = time - self._looked >= THERMOMETER_EVERY
+        rests = time - self._changed > STEADY
+        near = self._setpoint if rests else self._moved_to(measured)
+        why = self._readback.complaint(near, measured, self._limits.compliance)
+        due = rests and time - self._looked >= THERMOMETER_EVERY
         if why is not None or not due or abs(measured) < THERMOMETER_CURRENT:
             return why
         self._looked = time
@@ -190,6 +201,11 @@ class Interlock:
         if self.thermometer.warning is not None:
             self._warn(self.thermometer.warning)
         return why
+
+    def _moved_to(self, measured: float) -> float:
+        """The nearest to what was measured, A, of what was passed in `MOVED` s."""
+        passed = [setpoint for _, setpoint in self._moves]
+        return min(max(measured, min(passed)), max(passed))
 
     def _unguarded(self) -> str | None:
         if self._guard is None or self._guard.lost is None:

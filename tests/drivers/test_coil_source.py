@@ -1,5 +1,6 @@
 import itertools
 import math
+from contextlib import nullcontext
 
 import pytest
 
@@ -231,6 +232,21 @@ def test_an_open_circuit_trips_where_the_set_point_never_rests_long(bench):
             clock.sleep_until(clock.now() + 0.25)
             coil.read_current()
     assert not far.output_on and far.setpoint == 0.0
+
+
+@pytest.mark.parametrize("on", [True, False])
+def test_a_current_that_moves_all_the_time_is_judged_by_where_it_was(bench, on):
+    """A vibration never rests for 0.1 s, and was played with the output off."""
+    clock, _plant, far, coil = bench
+    coil.open()
+    coil.energise()
+    play(clock, coil, [0.5] * 5)
+    far.switch(on)
+    with nullcontext() if on else pytest.raises(InterlockError, match="but 0 A flows"):
+        for _ in range(4):
+            play(clock, coil, [0.3, 0.35, 0.4, 0.35] * 5)
+            coil.read_current()
+    assert far.output_on is on
 
 
 @pytest.mark.parametrize(
