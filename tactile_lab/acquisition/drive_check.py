@@ -1,8 +1,9 @@
 """Do source, shunt and teslameter tell of the current asked for? At a trial's end.
 
-A source whose answers come late again and again climbs so slowly that a hold is over
-before its current is reached, and one that is set or switched off at its panel is not
-switched off by the driver within a second: the run would hold a force of another name.
+A source that is late again and again, or its computer, climbs so slowly that a hold may
+be over before its current is reached, and one that is set or switched off at its panel
+is not switched off by the driver within a second: the run would hold a force of another
+name.
 The source's own read-back cannot know what its current does: a magnet that has moved,
 an unplugged winding of two, a probe that has slipped or a dead shunt change the force,
 or what is recorded of it, and nothing else. What is not measured is not compared. Where
@@ -168,9 +169,9 @@ def _held(asked: Waveform, current: FloatArray, hold: tuple[float, float]) -> st
         return ""
     return (
         f"it asks for {show(level, 'A')} in its hold, and the source gave "
-        f"{show(farthest, 'A')}: the force is not what it is called. The source "
-        "answers too late to climb in time, was set or switched off by hand, or the "
-        "circuit is open. Check link, front panel and leads."
+        f"{show(farthest, 'A')} in a part of it: the force is not what it is called. "
+        "Set-points came too late to climb in time, the source was set or switched off "
+        "by hand, or the circuit is open. Check link, front panel and leads."
     )
 
 
