@@ -333,6 +333,7 @@ class SerialLink:
 
     def _exchange(self, line: str, blank: bool = False) -> str:
         self._doubtful = True
+        self._drop_unasked()
         self._send(line)
         for sent in (*self._echoes, line) if self.wire.echo else ():
             repeated = self._receive(sent)
@@ -351,6 +352,16 @@ class SerialLink:
             )
         self._doubtful = False
         return answer
+
+    def _drop_unasked(self) -> None:
+        """What came before a line is sent, as an answer twice, does not answer it."""
+        if self._echoes:  # of lines that had no answer: they are read with the next
+            return
+        with self._mapped() as port:
+            for _ in range(LONGEST_LATE):
+                if not (waiting := port.in_waiting):
+                    break
+                self._tell("<", port.read(waiting))
 
     def _send_preamble(self) -> None:
         if self.wire.preamble or self.half_sent:

@@ -249,6 +249,21 @@ def test_a_current_that_moves_all_the_time_is_judged_by_where_it_was(bench, on):
     assert far.output_on is on
 
 
+def test_an_answer_that_comes_twice_answers_no_other_question(bench):
+    """2.5 V, answered twice, were stored as a coil current of 2.5 A."""
+    clock, _plant, far, coil = bench
+    coil.open()
+    coil.energise()
+    play(clock, coil, [0.5] * 10)
+    act = far.line
+    far.line = lambda line: act(line) and b"\n".join([act(line)] * 2)
+    clock.sleep_until(clock.now() + 0.2)
+    assert coil._wire.voltage() == pytest.approx(2.5)
+    far.line = act
+    clock.sleep_until(clock.now() + 0.2)
+    assert coil.read_current().value == pytest.approx(0.5)
+
+
 @pytest.mark.parametrize(
     ("done", "why"),
     [
