@@ -108,16 +108,21 @@ def test_a_source_that_is_there_is_looked_at_and_stays_ready(
     assert len(served.log.lines) == said, "a look that finds all well says nothing"
 
 
-def test_an_output_that_is_switched_on_by_hand_is_told_and_left_on(
-    served: Session, source: Source
-) -> None:
-    """A look each minute is no reason to take the coil from a person."""
+def switch_on_by_hand(served: Session, source: Source) -> None:
+    """As somebody does at the source's front panel; the next look finds it."""
     with serial_for_url(source.served.addresses["coil"]) as by_hand:
         by_hand.write(b"CURR 0.3\nOUTP 1\n")
         while not source.output:
             time.sleep(0.005)
     served.bench.look()
     until(served, lambda: served.state is WindowState.FAULT)
+
+
+def test_an_output_that_is_switched_on_by_hand_is_told_and_left_on(
+    served: Session, source: Source
+) -> None:
+    """A look each minute is no reason to take the coil from a person."""
+    switch_on_by_hand(served, source)
     fault = served.snapshot().fault
     assert fault is not None and "output is on" in fault.title
     assert source.output, "nothing was touched"
@@ -158,12 +163,7 @@ def test_stop_switches_off_what_a_fault_found_on(
     served: Session, source: Source
 ) -> None:
     """It did nothing at a fault, while 300 mA flowed and the source answered."""
-    with serial_for_url(source.served.addresses["coil"]) as by_hand:
-        by_hand.write(b"CURR 0.3\nOUTP 1\n")
-        while not source.output:
-            time.sleep(0.005)
-    served.bench.look()
-    until(served, lambda: served.state is WindowState.FAULT)
+    switch_on_by_hand(served, source)
     served.stop()
     until(served, lambda: coil(served) is CoilKnowledge.OFF)
     assert not source.output
