@@ -83,6 +83,12 @@ class RecordedSignal:
         return inside
 
 
+def unlike_asked(*, complete: bool, skipped: int) -> str:
+    """What stands behind a trial that was not played as asked for; "" if it was."""
+    cut = "" if complete else ", cut short"
+    return f"{cut}, {count(skipped, 'set-point')} skipped" if skipped else cut
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredTrial:
     """One trial of the run.
@@ -129,9 +135,7 @@ class MeasuredTrial:
     @property
     def name(self) -> str:
         """What its protocol calls it, whether it came to its end, and as asked for."""
-        cut = [] if self.complete else ["cut short"]
-        late = [f"{count(self.skipped, 'set-point')} skipped"] if self.skipped else []
-        return ", ".join([self.label, *cut, *late])
+        return self.label + unlike_asked(complete=self.complete, skipped=self.skipped)
 
     @property
     def held(self) -> tuple[float, float] | None:

@@ -90,7 +90,8 @@ class CoilWatch:
                 False,
                 off.current,
                 0.0,
-                read_age=now - self._off_since,
+                # nobody else can switch on one that is only simulated
+                read_age=now - self._off_since if self._port else 0.0,
                 verified_off=off.verified,
                 limit=limit,
             )

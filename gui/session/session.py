@@ -6,7 +6,6 @@ window's timer calls `poll`, which hands over all that the engine told. Nothing 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -326,10 +325,7 @@ class Session(QObject):
     def coil_view(self) -> CoilView | None:
         """The coil as it is known now."""
         task = self.manual if self.manual.alive else self.run
-        coil, spec = self.status.coil.view(task.coil, task.heard), self.bench.spec
-        if coil is not None and not coil.output and spec is not None and spec.simulated:
-            return replace(coil, read_age=0.0)  # nobody else can switch that on
-        return coil
+        return self.status.coil.view(task.coil, task.heard)
 
     def snapshot(self) -> Snapshot:
         """Everything the header, banner and buttons are rendered from."""

@@ -120,6 +120,7 @@ def describe(path: Path) -> dict[str, Any]:
 
 def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
     """Names and what is shown beside them; rows without a value are left out."""
+    from tactile_lab.measurement import unlike_asked
     from tactile_lab.quantity import count, show
     from tactile_lab.scene.tables import ZERO_CELSIUS
 
@@ -157,13 +158,11 @@ def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
             times = f"{begun} to {trial['end_s']:.3f} s"
         else:  # prepared, and the run ended before it
             times = f"would have begun at {begun} s"
-        cut = "" if trial["complete"] else ", cut short"
-        skipped = trial["skipped"]
-        late = f", {count(skipped, 'set-point')} skipped" if skipped else ""
+        unlike = unlike_asked(complete=trial["complete"], skipped=trial["skipped"])
         spikes = trial["spikes"]
         told = "" if spikes is None else f", {count(spikes, 'spike')}"
         told += " seen, no count" if trial["uncounted"] else ""
-        yield "trial", f"{trial['label']:<12} {times}{told}{cut}{late}"
+        yield "trial", f"{trial['label']:<12} {times}{told}{unlike}"
     if summary["overrange_blocks"]:
         yield "over range", f"in {summary['overrange_blocks']} blocks"
     if summary["loss"]:

@@ -29,7 +29,7 @@ class Told:
         self.now = 1000.0
         self.session = Session(folder, separate=False)
         self.session.status.state = WindowState.READY
-        self.session.status.coil.use(LIMITS)
+        self.session.status.coil.use(LIMITS, "COM3")
         self.session.status.coil.left(VERIFIED)
         self.task: LiveTask = self.session.run
 
