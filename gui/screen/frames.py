@@ -1,4 +1,8 @@
-"""The frame loop: polls the session, repaints what moved, keeps to its budget."""
+"""The frame loop: polls the session, repaints what moved, keeps to its budget.
+
+Lanes, numbers and what a step's end lays out anew take turns: all in one, the longest
+frame was twice the usual one, and a press of STOP waited as long.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +24,9 @@ NUMBERS = 0.1
 BUDGET = 0.3
 """Share of a core that this thread may take before frames come less often."""
 
+MUCH = 0.2
+"""Share of a usual frame from which what was told comes first, lanes a frame later."""
+
 USUAL, STEP = 0.1, 2
 """Weight of the newest frame in the usual cost; finest change of the interval, ms."""
 
@@ -31,7 +38,13 @@ UNKEPT = {
 
 
 class FrameLoop(QObject):
-    """Moves what is on screen."""
+    """Moves what is on screen.
+
+    Attributes:
+        frozen: whether the lanes stand still.
+        behind: whether lanes wait for the next frame to show what was told.
+        between: runs out halfway to the next frame where numbers are to be shown.
+    """
 
     told = Signal(object)
     """The newest snapshot, as often as numbers can be read."""
@@ -40,12 +53,16 @@ class FrameLoop(QObject):
         super().__init__(panels.centre)
         self._panels, self._screen = panels, screen
         self.frozen = False
-        self._numbers = 0.0
+        self._numbers = self._drawn = 0.0
         self._used, self._usual = time.thread_time(), 0.0
+        self.behind = False
         self._timer = QTimer(self)
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self.tick)
         self._timer.start(FAST)
+        self.between = QTimer(self)
+        self.between.setSingleShot(True)
+        self.between.timeout.connect(self.show_numbers)
         panels.centre.tools.freeze.toggled.connect(self.freeze)
 
     def freeze(self, on: bool) -> None:
@@ -65,30 +82,37 @@ class FrameLoop(QObject):
     def stop(self) -> None:
         """End the loop."""
         self._timer.stop()
+        self.between.stop()
 
     def tick(self) -> None:
         """One frame."""
         self._keep_budget()
         panels, session = self._panels, self._panels.session
-        told = session.poll()
+        self.behind |= session.poll()
+        much = time.thread_time() - self._used > MUCH * self._usual
         for stop in panels.stops:
             left = session.status.coil.left_unknown
             stop.show_coil(session.state, session.coil_view(), left)
         now = time.monotonic()
         source, seen = self._screen.live, not panels.centre.lanes.window().isMinimized()
-        if source is not None and told and seen and not self.frozen:
-            self._show_newest(source)
+        late = now - self._drawn >= SLOW / 1e3
+        if source is not None and self.behind and (late or not much):
+            self.behind = False
+            if seen and not self.frozen:
+                self._drawn = now
+                self._show_newest(source)
         self._screen.take_fetched()
         if now - self._numbers >= NUMBERS:
             self._numbers = now
-            self._show_numbers()
+            self.between.start(self.interval // 2)
 
     def _show_newest(self, source: LiveSource) -> None:
         centre = self._panels.centre
         centre.view.set_now(source.reach, source.length)
         centre.stack.refresh()
 
-    def _show_numbers(self) -> None:
+    def show_numbers(self) -> None:
+        """Tell the newest numbers, on cards and in the lines below and above."""
         panels, session = self._panels, self._panels.session
         snapshot = session.snapshot()
         self.told.emit(snapshot)

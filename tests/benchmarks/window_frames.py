@@ -7,9 +7,11 @@ and an hour-long record at 1 MS/s scrolled and zoomed. A frame is the poll plus 
 painting it causes, in the window's own thread; "processor" is its own time, which
 other programs on the machine do not change. All lanes are painted in every frame but
 those of the run in real time: there the window paints where something was told, and
-frames that painted nothing are left out. Gaps are those of a 10 ms heartbeat; "of
-its own" leaves out the time in which Linux gave the processor to somebody else.
-The window has 1720 x 1080 px; with `--scale`, so many device pixels to each.
+frames that had nothing to paint are left out. Numbers are shown ten times a second
+halfway between two frames, and have a row of their own. Gaps are those of a 10 ms
+heartbeat; "of its own" leaves out the time in which Linux gave the processor to
+somebody else. The window has 1720 x 1080 px; with `--scale`, so many device pixels to
+each.
 
 `window_figures.py` puts this and its neighbours into one page.
 """
@@ -20,7 +22,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -71,6 +73,7 @@ class Bench:
         self._collected.__enter__()  # as in the program, to the end of this process
         self.frames: list[float] = []
         self.used: list[float] = []
+        self.numbers: list[tuple[float, float]] = []
         self.gaps: list[float] = []
         self.own: list[float] = []
         self._reported = False
@@ -85,6 +88,16 @@ class Bench:
         self._timer = QTimer()
         self._timer.timeout.connect(self._frame)
         self._timer.start(33)
+        between = self.window.frames.between
+        between.timeout.disconnect()
+        between.timeout.connect(self._number)
+
+    def _number(self) -> None:
+        begun, used = time.perf_counter(), time.thread_time()
+        self.window.frames.show_numbers()
+        QApplication.sendPostedEvents(None, QEvent.Type.UpdateRequest)
+        now = time.perf_counter(), time.thread_time()
+        self.numbers.append((now[0] - begun, now[1] - used))
 
     def _note(self) -> None:
         now, waited = time.perf_counter(), _waited()
@@ -101,7 +114,7 @@ class Bench:
         if self.each:
             self.window.centre.stack.refresh()
         QApplication.sendPostedEvents(None, QEvent.Type.UpdateRequest)
-        if self._painted:
+        if self._painted or self.window.frames.behind:
             self.frames.append(time.perf_counter() - begun)
             self.used.append(time.thread_time() - used)
 
@@ -120,7 +133,7 @@ class Bench:
         self.report(name)
 
     def clear(self) -> None:
-        for kept in (self.frames, self.used, self.gaps, self.own):
+        for kept in (self.frames, self.used, self.numbers, self.gaps, self.own):
             kept.clear()
         self._last, self._waited = time.perf_counter(), _waited()
 
@@ -128,15 +141,12 @@ class Bench:
         if not self._reported:
             print(HEAD)
         self._reported = True
-        cost = 1e3 * np.array(self.frames or [np.nan])
-        used = 1e3 * np.array(self.used or [np.nan])
         gap = 1e3 * max(self.gaps, default=float("nan"))
         own = 1e3 * max(self.own, default=float("nan"))
-        print(
-            f"| {name} | {cost.size} | {np.median(cost):.1f} | "
-            f"{np.percentile(cost, 99):.1f} | {np.median(used):.1f} | "
-            f"{np.percentile(used, 99):.1f} | {gap:.0f} | {own:.0f} |"
-        )
+        print(f"| {name} | {_spread(self.frames, self.used)} | {gap:.0f} | {own:.0f} |")
+        numbers = list(zip(*self.numbers, strict=True))
+        if numbers:
+            print(f"| · its numbers, between | {_spread(*numbers)} | | |")
 
     def say(self, text: str) -> None:
         """A sentence between the tables."""
@@ -185,6 +195,13 @@ def hour(source: LiveSource) -> None:
             bins = Trace.bins(time_, mean - 0.05, mean + 0.05, mean, 1e-3)
             source.add_bins({signal: bins})
     source.add_spikes(tuple(np.sort(rng.uniform(0, 3600, 36_000)).tolist()))
+
+
+def _spread(cost: Sequence[float], used: Sequence[float]) -> str:
+    """How many, then median and p99 of what they took and of the processor time, ms."""
+    each = (1e3 * np.array(of or [np.nan]) for of in (cost, used))
+    told = [f"{np.percentile(of, q):.1f}" for of in each for q in (50, 99)]
+    return " | ".join([str(len(cost)), *told])
 
 
 def _waited() -> float:

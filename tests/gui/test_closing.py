@@ -41,9 +41,12 @@ def test_the_question_on_closing_tells_what_the_coil_does_now(lab) -> None:
     lab.until(lambda: window.header.stop.truth is CoilKnowledge.LIVE)
     assert not window.close()
     window.closing.now.setText("as it was")
-    lab.until(lambda: window.closing.now.text() != "as it was")
-    coil = session.coil_view()
-    assert stop_text(session.state, coil).detail in window.closing.now.text()
+
+    def coil_is_told() -> bool:
+        told = stop_text(session.state, session.coil_view()).detail
+        return told in window.closing.now.text()
+
+    lab.until(coil_is_told)
     session.stop("while it is asked")
     lab.until(lambda: not session.busy)
     lab.until(lambda: not window.closing.isVisible())

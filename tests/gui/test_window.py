@@ -1,15 +1,18 @@
 """The window as a whole: keys, themes, sizes, names, frames."""
 
 import gc
+import math
 import sys
 import time
+from collections.abc import Callable
 from itertools import product
 
 import pytest
-from PySide6.QtCore import QPoint, QPointF, QSize, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, QSize, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
+    QApplication,
     QComboBox,
     QLineEdit,
     QPushButton,
@@ -162,6 +165,50 @@ def test_lanes_are_painted_where_something_was_told(lab) -> None:
     lab.until(lambda: painted)
     window.centre.stack.scene.drawn.disconnect(noted)
     session.source = None
+
+
+def test_lanes_numbers_and_what_a_step_lays_out_take_turns(lab) -> None:
+    """All in one frame, the longest was twice the usual one, and STOP waited for it."""
+    window, session, frames = lab.window, lab.session, lab.window.frames
+    session.source = source = LiveSource(None, 0.2)
+    window.centre.stack.show_source(source)
+    drawn, told = list[int](), list[int]()
+    links = [
+        window.centre.stack.scene.drawn.connect(lambda: drawn.append(len(drawn))),
+        frames.told.connect(lambda _: told.append(len(told))),
+    ]
+
+    def lay_out(_: object) -> None:
+        end = time.thread_time() + 0.05
+        while time.thread_time() < end:
+            pass
+
+    def nothing(_: object) -> None:
+        """Something that asks for little."""
+
+    def painted(tell: Callable[[object], None]) -> bool:
+        drawn.clear()
+        frames._drawn = math.inf  # however long this computer has stood still
+        session.link._inbox.put((tell, None))
+        frames.tick()
+        QApplication.sendPostedEvents(None, QEvent.Type.UpdateRequest)
+        return bool(drawn)
+
+    frames.stop()  # they come from here alone
+    try:
+        lab.until(lambda: painted(nothing))
+        assert not painted(lay_out), "lanes and results in one frame"
+        lab.until(lambda: painted(nothing))
+        told.clear()
+        frames._numbers = -math.inf
+        frames.tick()
+        assert not told, "numbers in the frame of the lanes"
+        lab.until(lambda: told)
+    finally:
+        frames._timer.start(33)
+        window.centre.stack.scene.drawn.disconnect(links[0])
+        frames.told.disconnect(links[1])
+        session.source = None
 
 
 def test_frames_leave_the_processor_to_the_run(lab) -> None:
