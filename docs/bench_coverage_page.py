@@ -57,6 +57,15 @@ def stood(page: str, case: str) -> list[str]:
     return [line for line in page.splitlines() if line.startswith(f"| {case} |")]
 
 
+def stands(page: str, case: str, commit: str) -> str:
+    """The page on which the lines of a case hold to this commit, too."""
+    for line in stood(page, case):
+        head, _, commits = line.removesuffix(" |").rpartition(" | ")
+        told = ends([*commits.split(" to "), commit])
+        page = page.replace(line, f"{head} | {told} |")
+    return page
+
+
 def table(rows: list[dict[str, Any]], page: str = "") -> str:
     """The page; cases without rows as they stand on the one that was."""
     counts: dict[tuple[str, str], list[tuple[int, bool, float]]] = defaultdict(list)
@@ -136,10 +145,9 @@ or where the shunt does not show them by the steps next to them; the tau of `bip
 taken at both ends of the channel's offset, with 1 % of R1 and R2, of which R1 alone is
 drawn here.
 
-Of each row that names two commits, 30 seeds or more were run again at the later one.
-They told the same numbers, within 0.2 % of an interval's half-width.
-Of the rows that name 8753ae5, whose runs are not kept, the first 300 seeds were run
-again at 868b3b5 and held in 95.2 to 96.0 %.
+Of each row that names two commits, the first 30 seeds were run again at the later one
+(`docs/make_bench_coverage.py --again`, from what `docs/bench-coverage.csv` keeps). They
+told the same numbers and intervals, within 0.2 % of a half-width.
 
 "One number repeated" is no evidence of coverage, however many runs gave it. Offset and
 gain of `wiring_check` are such: the probes on 0 V and V_S pass by all that is drawn,

@@ -5,9 +5,11 @@ import runpy
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
-from bench_coverage_page import table
+from bench_coverage_again import SAME, SEEDS, again, keep, read
+from bench_coverage_page import stands, table
 
 
 @pytest.mark.parametrize(
@@ -40,6 +42,41 @@ def test_a_case_that_was_not_measured_here_stays_on_the_page():
     assert line in page
     assert "| old |" not in page
     assert "| rate_force, three forces | V_GS | 1 in 1 |" in page
+
+
+def told(seed: int, *, by: float = 0.0) -> dict[str, Any]:
+    """A row of a run that told one name twice, the second interval moved by so much."""
+    first, second = ["V_GS", 0.5, 0.4, 0.6, 0.5], ["V_GS", 0.5, 0.4, 0.6 + by, 0.5]
+    return {
+        "case": "force_check", "seed": seed, "commit": "0000000", "cpu": 1.0,
+        "told": [first, second],
+    }  # fmt: skip
+
+
+def test_first_seeds_tell_whether_a_case_still_stands(tmp_path):
+    file, half = tmp_path / "kept.csv", 0.1
+    keep(map(told, range(SEEDS + 5)), file)
+    assert list(read(file)["force_check"]) == list(range(SEEDS))
+    keep([told(0, by=1.0)], file)  # stopped after one run: not what it tells
+    kept = read(file)["force_check"]
+    assert again(kept, told) == 0.0
+    most = again(kept, lambda seed: told(seed, by=0.5 * SAME * half if seed else 0.0))
+    assert 0.0 < most < SAME
+    assert again(kept, lambda seed: told(seed, by=half * (seed == 7))) > SAME
+    refused = {**told(0), "told": []}
+    assert again(kept, lambda seed: refused) == float("inf")
+
+
+def test_a_case_that_stands_names_where_it_was_run_again():
+    line, other = (
+        "| wiring_check | V_GS | 1 | {} |",
+        "| force_check | F | 1 | 1111111 |",
+    )
+    page = f"{line.format('0000000')}\n{other}"
+    page = stands(page, "wiring_check", "2222222")
+    assert page == f"{line.format('0000000 to 2222222')}\n{other}"
+    page = stands(page, "wiring_check", "3333333")
+    assert page == f"{line.format('0000000 to 3333333')}\n{other}"
 
 
 @pytest.mark.parametrize(
