@@ -55,7 +55,10 @@ def keep(rows: Iterable[dict[str, Any]], file: Path = KEPT) -> None:
         made.writerow(HEAD)
         for case, seeds in sorted(runs.items()):
             for seed, (commit, told) in sorted(seeds.items()):
-                made.writerows((case, seed, commit, *one) for one in told)
+                made.writerows(
+                    (case, seed, commit, name, *(f"{one:.9g}" for one in numbers))
+                    for name, *numbers in told
+                )
 
 
 def moved(before: Told, now: Told) -> float:
