@@ -44,11 +44,12 @@ GOALS = """\
 A frame is a poll and the painting it causes, in the window's own thread: every 33 ms,
 and less often, at least ten times a second, where that thread would take more than 30 %
 of a core ([why](decisions/frames-within-a-budget.md)). A frame that leaves its lanes to
-the next counts as one; numbers, shown halfway between two, have a row. Asked for: median at most 16 ms
-or idle + 8 ms, p99 at most 33 ms or 1.3 times that of idle (12 and 22 ms in a run in
-real time with seven lanes), gaps under 100 ms, at most 35 % of a core in a run, a
-usable window within 2 s, READY within 2.7 s, STOP to verified off within 0.3 s on a
-source that answers in 5 ms ([beside other
+the next counts as one; numbers, shown halfway between two, have a row.
+
+Asked for: median at most 16 ms or idle + 8 ms, p99 at most 33 ms or 1.3 times that of
+idle (12 and 22 ms in a run in real time with seven lanes), gaps under 100 ms, at most
+35 % of a core in a run, a usable window within 2 s, READY within 2.7 s, STOP to
+verified off within 0.3 s on a source that answers in 5 ms ([beside other
 programs](decisions/stop-on-a-busy-computer.md) later), flat memory, and at most 300 MB
 of all processes together after an hour of runs.
 
