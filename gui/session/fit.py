@@ -37,7 +37,8 @@ ONSET, SLOPE = "Onset", "Slope of the peak rate"
 ADAPTATION, FALL = "Adaptation 1/|β|", "Fall in the hold"
 CARDS = (ONSET, SLOPE, ADAPTATION, FALL)
 
-SILENT = "No step that ended has fired."
+NONE_FIRED = "no step that ended has fired"
+SILENT = f"{NONE_FIRED.capitalize()}."
 """Said also beside spikes of one that goes on, or that a fault ended."""
 
 UNENDED = "no step was completed: nothing is concluded"
@@ -250,7 +251,10 @@ def _card(
 
 
 def _onset(steps: Sequence[MeasuredTrial]) -> tuple[str, str]:
-    found = onset([f.level or 0.0 for f in steps], [f.response.spikes for f in steps])
+    spikes = [f.response.spikes for f in steps]
+    if not any(spikes):  # one that was cut short may have, and is seen beside it
+        raise NotIdentifiableError(NONE_FIRED)
+    found = onset([f.level or 0.0 for f in steps], spikes)
     low, high = found.silent * 1e3, found.fires * 1e3
     return f"{number(found.middle * 1e3, 0)} mN", printed(f"{low:.4g} to {high:.4g} mN")
 

@@ -85,9 +85,9 @@ def test_the_ends_of_an_interval_are_told_apart_and_where_it_is_in_words() -> No
 
 def test_first_steps_say_what_is_missing() -> None:
     cards = {card.name: card for card in fit(STEPS[:1], seen()).cards}
-    detail = cards["Onset"].detail
-    assert cards["Onset"].value == "—" and detail.startswith("No spike was detected")
-    assert cards["Adaptation 1/|β|"].detail == "No step that ended has fired."
+    assert cards["Onset"].value == "—"
+    for name in ("Onset", "Adaptation 1/|β|"):  # it may stand beside one that fired
+        assert cards[name].detail == "No step that ended has fired."
     assert cards["Fall in the hold"].value == "—"
     assert fit([], seen()).cards == ()
 
