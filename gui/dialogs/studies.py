@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from html import escape
 from pathlib import Path
 
-from PySide6.QtCore import QTimer, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
 from gui.dialogs.overlay import Overlay
@@ -13,6 +14,7 @@ from gui.look.theme import Theme
 from gui.on_desktop import open_on_desktop
 from gui.parts import STRETCH, Combo, column, label, push, row, say, scrolling
 from gui.plots.small_plot import SmallPlot
+from tactile_lab.conclusion import Table
 from tactile_lab.errors import RunFolderError, TactileLabError
 from tactile_lab.studies.live import SeenStudy, is_running, look_at, studies_in
 from tactile_lab.studies.page import REPORT
@@ -20,8 +22,8 @@ from tactile_lab.studies.page import REPORT
 AGAIN = 1000
 """Milliseconds after which the files are looked at anew."""
 NONE = (
-    "No studies yet. tactile-lab study STUDY.toml makes one: a scene at many points, "
-    "see docs/studies.md."
+    "No studies yet in {}. tactile-lab study STUDY.toml --out there makes one: a scene "
+    "at many points, see docs/studies.md."
 )
 
 
@@ -37,6 +39,7 @@ class StudiesCard(Overlay):
     Attributes:
         choice: of studies.
         text: what the chosen one says.
+        tables: what it says beyond that.
         figures: of it.
         hint: what a click does, or why it did not.
     """
@@ -56,6 +59,8 @@ class StudiesCard(Overlay):
         self.choice.setAccessibleName("Study")
         self.state = label("", "pill")
         self.text = label("", "", wrap=True)
+        self.tables = label("", "", wrap=True)
+        self.tables.setTextFormat(Qt.TextFormat.RichText)
         self.hint = label(HINT, "muted", wrap=True)
         self.page = push("Open the report")
         self.page.clicked.connect(self._open_page)
@@ -67,7 +72,7 @@ class StudiesCard(Overlay):
         self.point = push("Open the point")
         self.point.clicked.connect(lambda: self._pick(self.points.currentData()))
         inner = QWidget()
-        self._rows = column(inner, self.text, spacing=10)
+        self._rows = column(inner, self.text, self.tables, spacing=10)
         self._rows.addStretch(1)
         self._area = scrolling(inner)
         self.give_room(self._area, 430)
@@ -119,7 +124,7 @@ class StudiesCard(Overlay):
         self.choice.setVisible(folder is not None)
         self.state.setVisible(folder is not None)
         if folder is None:
-            say(self.text, NONE)
+            say(self.text, NONE.format(self._roots[0]))
             self._draw(None)
             self.page.setEnabled(False)
             return
@@ -145,6 +150,9 @@ class StudiesCard(Overlay):
     def _draw(self, seen: SeenStudy | None) -> None:
         plots = () if seen is None else seen.plots
         self._seen = seen
+        told = as_html(() if seen is None else seen.tables, self._theme.tokens.muted)
+        self.tables.setText(told)
+        self.tables.setVisible(bool(told))
         say(self.hint, HINT if plots else "")
         self.points.clear()
         for number, point in ({} if seen is None else seen.points).items():
@@ -156,7 +164,7 @@ class StudiesCard(Overlay):
             figure.picked.connect(self._pick)
             figure.tell = self._told
             self.figures.append(figure)
-            self._rows.insertWidget(len(self.figures), figure)
+            self._rows.insertWidget(1 + len(self.figures), figure)
         for figure, plot in zip(self.figures, plots, strict=False):
             figure.show_plot(plot)
             figure.setMaximumHeight(figure.minimumHeight())
@@ -182,6 +190,33 @@ class StudiesCard(Overlay):
     def _open_page(self) -> None:
         if self._chosen is not None:
             say(self.hint, open_on_desktop(self._chosen / REPORT))
+
+
+def as_html(tables: Iterable[Table], muted: str) -> str:
+    """Tables under their titles as rich text; headings and notes have a colour."""
+    found = []
+    for table in tables:
+        head, *rows = (_html_row(cells) for cells in (table.headings, *table.rows))
+        found += [
+            f"<p><b>{escape(table.title, quote=False)}</b></p>" if table.title else ""
+        ]
+        found += [f'<table cellspacing="0"><tr style="color:{muted}">{head}</tr>']
+        found += [f"<tr>{cells}</tr>" for cells in rows]
+        found += [
+            f'</table><p style="color:{muted}">{escape(table.note, quote=False)}</p>'
+        ]
+    return "".join(found)
+
+
+def _html_row(cells: Sequence[str]) -> str:
+    """Cells of a row: the first and the last stand left, the rest right."""
+    sides = ["right"] * len(cells)
+    sides[0] = sides[-1] = "left"
+    return "".join(
+        f'<td align="{side}" style="padding:3px 18px 3px 0">'
+        f"{escape(cell, quote=False)}</td>"
+        for side, cell in zip(sides, cells, strict=True)
+    )
 
 
 def show_studies(

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.conclusion import Table
 from tactile_lab.errors import RunFolderError
 from tactile_lab.plot import Plot
 from tactile_lab.quantity import count, show
@@ -73,7 +74,10 @@ class LiveStudy:
 
 
 def shown(
-    found: Gathered, sentences: Iterable[str], drawn: Iterable[Plot]
+    found: Gathered,
+    sentences: Iterable[str],
+    drawn: Iterable[Plot],
+    tables: Iterable[Table] = (),
 ) -> dict[str, Any]:
     """What the window shows of a study, as JSON takes it."""
     study, drawn = found.study, list(drawn)
@@ -92,6 +96,7 @@ def shown(
     return {
         "title": study.title,
         "sentences": list(sentences),
+        "tables": [asdict(table) for table in tables],
         "plots": [plot.to_dict() for plot in drawn],
         "points": points,
     }
@@ -135,6 +140,7 @@ class SeenStudy:
         folder: of the study.
         title: for people.
         sentences: what it says, or how far it is.
+        tables: what it says beyond them, such as the share that each axis has.
         plots: its figures so far.
         points: those that the figures show, by their number.
         running: whether somebody carries it out now.
@@ -143,6 +149,7 @@ class SeenStudy:
     folder: Path
     title: str
     sentences: tuple[str, ...]
+    tables: tuple[Table, ...]
     plots: tuple[Plot, ...]
     points: Mapping[int, SeenPoint]
     running: bool
@@ -195,18 +202,26 @@ def look_at(folder: Path) -> SeenStudy:
         sentences = tuple(map(str, told["sentences"]))
         if file.name == LIVE and not running:
             sentences += ("Nobody computes it now; start it again and it goes on.",)
+        tables = tuple(map(_table, told.get("tables", ())))
         drawn = tuple(Plot.from_dict(plot) for plot in told["plots"])
         points = {
             int(number): SeenPoint(tuple(changes), str(reason), str(address))
             for number, (changes, reason, address) in told.get("points", {}).items()
         }
         title = str(told["title"])
-        return SeenStudy(folder, title, sentences, drawn, points, running)
+        return SeenStudy(folder, title, sentences, tables, drawn, points, running)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise RunFolderError(
             f"{folder} holds no study that can be read ({type(error).__name__}: "
             f"{error}). Carry it out again: what is known is not computed anew."
         ) from error
+
+
+def _table(told: Mapping[str, Any]) -> Table:
+    """A table from what `shown` made of it."""
+    rows = tuple(tuple(row) for row in told["rows"])
+    heads = tuple(told["headings"])
+    return Table(title=told["title"], headings=heads, rows=rows, note=told["note"])
 
 
 def _told_in(folder: Path) -> Path | None:

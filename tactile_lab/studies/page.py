@@ -73,7 +73,7 @@ def _written(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
     results = {
         MADE_OF: study_digest(study),
         "text": said.text,
-        SHOWN: shown(found, [*said.sentences, *said.missing], drawn),
+        SHOWN: shown(found, [*said.sentences, *said.missing], drawn, said.tables),
         **said.plain,
     }
     write_json(folder / RESULTS, results)

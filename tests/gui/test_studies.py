@@ -126,3 +126,31 @@ def test_one_that_was_killed_says_how_to_go_on(tmp_path: Path) -> None:
     assert "start it again" in look_at(folder).sentences[-1]
     with pytest.raises(RunFolderError):
         look_at(tmp_path)
+
+
+def test_what_axes_share_is_told_in_the_window_too(lab, tmp_path: Path) -> None:
+    """A study of spread said how many points it had, over an empty card."""
+    asked = load_study(
+        {
+            "title": "Spread <of parts>",
+            "scene": "demo",
+            "keep": ["critical_force"],
+            "draw": {"points": 8, "method": "indices"},
+            "axis": [
+                {"key": "sensor.R1", "normal": "1 %"},
+                {"key": "sensor.V_GS", "normal": "3 mV"},
+            ],
+        },
+        "spread",
+    )
+    out = tmp_path / "studies"
+    _, said = write_page(carry_out(asked, out, count=1), out / "spread")
+    card = StudiesCard(lab.window, Theme("light"))
+    card.show_studies((out,))
+    (table,) = look_at(out / "spread").tables
+    assert (table,) == said.tables and not card.figures
+    told = card.tables.text()
+    assert card.tables.isVisibleTo(card) and "Sobol indices of critical_force" in told
+    assert "sensor.V_GS" in told and table.rows[1][-1] in told and table.note in told
+    card.hide()
+    card.deleteLater()
