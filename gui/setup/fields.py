@@ -25,7 +25,7 @@ from PySide6.QtWidgets import (
 
 from gui.ask_file import ask_file
 from gui.parts import STRETCH, Combo, column, filled, label, row, say
-from gui.setup.parameter import FieldText, FormField, Kind, text_of
+from gui.setup.parameter import FieldText, FormField, Kind, text_of, with_unit
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import exact, parse
 
@@ -68,7 +68,11 @@ class QuantityEdit(QLineEdit):
         super().focusInEvent(event)
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
-        """A stay ends."""
+        """A stay ends: a bare number shows what unit it is taken in."""
+        whole = with_unit(self._parameter, self.text())
+        if whole != self.text():  # 300 where 250 ms stood is 300 s
+            self.setText(whole)
+            self.edited.emit()
         self.stay = None
         super().focusOutEvent(event)
 

@@ -326,6 +326,18 @@ def _value(parameter: FormField, text: str) -> Any:
     return text
 
 
+def with_unit(parameter: FormField, text: str) -> str:
+    """The text of a quantity with the unit it is taken in, where none is written."""
+    quantities = Kind.QUANTITY, Kind.QUANTITIES
+    if parameter.kind not in quantities or parameter.unit is None:
+        return text
+    try:
+        float(typed(re.split("[,;]", text)[-1]))
+    except ValueError:
+        return text
+    return f"{text.strip()} {parameter.unit.symbol}"
+
+
 def _quantity(text: str, unit: str) -> str:
     """Text with a unit: a bare number gets `unit`."""
     text = typed(text)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QFocusEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 
@@ -121,6 +122,31 @@ def test_typing_marks_undoes_and_redoes(app: QApplication) -> None:
     assert hold.text == "2 s" and not hold.value.is_changed
     form.edits.redo()
     assert hold.text != "2 s"
+
+
+@pytest.mark.parametrize(
+    ("key", "typed", "shown"),
+    [
+        ("hold", "300", "300 s"), ("hold", "300 ms", "300 ms"), ("hold", "", ""),
+        ("hold", "x", "x"), ("levels", "0.08; 0.12", "0.08; 0.12 N"),
+        ("levels", "80, 120 mN", "80, 120 mN"), ("seed", "7", "7"),
+    ],
+)  # fmt: skip
+def test_a_number_that_is_left_shows_its_unit(
+    app: QApplication, key: str, typed: str, shown: str
+) -> None:
+    """300 where 250 ms stood was 300 s, and nothing at the field said so."""
+    form = Form()
+    form.show_protocol(protocol_class("pulses"), {})
+    edit = form.field(key).findChild(QLineEdit)
+    assert isinstance(edit, QLineEdit)
+    edit.selectAll()
+    QTest.keyClick(edit, Qt.Key.Key_Delete)
+    QTest.keyClicks(edit, typed)
+    before = form.field(key).value.problem
+    QApplication.sendEvent(edit, QFocusEvent(QEvent.Type.FocusOut))
+    assert form.field(key).text == edit.text() == shown
+    assert bool(form.field(key).value.problem) == bool(before)
 
 
 def test_arrow_keys_step(app: QApplication) -> None:
