@@ -51,8 +51,10 @@ def trials_table(run: Measurement) -> Table:
         *("Fall in hold", "Time constant"),
     )
     rows = tuple(
-        (*(trial.name,) * named, *_row(run, trial), constant)
-        for trial, constant in zip(run.results, _time_constants(run), strict=True)
+        (*(trial.name,) * named, force, *_row(trial), constant)
+        for trial, force, constant in zip(
+            run.results, _forces(run), _time_constants(run), strict=True
+        )
     )
     return Table(headings=headings, rows=rows, note=note)
 
@@ -139,15 +141,26 @@ def circuit_fits_table(run: Measurement) -> Table:
     )  # fmt: skip
 
 
-def _row(run: Measurement, trial: MeasuredTrial) -> tuple[str, ...]:
-    response, force = trial.response, NONE
-    if trial.level is not None:
-        force = _with(trial.level, run.uncertain(trial.level), "N", 4)
-    latency = NONE
+def _forces(run: Measurement) -> Iterator[str]:
+    """The force of each trial, as finely as it takes to tell one level from another.
+
+    Levels of one run share the error of the scale: they differ by less than its band.
+    """
+    levels = {trial.level for trial in run.results if trial.level is not None}
+    told: dict[float, str] = {}
+    for digits in (2, 3, 4):
+        told = {at: _with(at, run.uncertain(at), "N", 4, digits) for at in levels}
+        if len(set(told.values())) == len(levels):
+            break
+    for trial in run.results:
+        yield NONE if trial.level is None else told[trial.level]
+
+
+def _row(trial: MeasuredTrial) -> tuple[str, ...]:
+    response, latency = trial.response, NONE
     if response.latency is not None:
         latency = _with(response.latency, trial.clock_uncertainty, "s", 3)
     return (
-        force,
         trial.seen,
         str(response.ramp_spikes) if response.ramp_spikes else NONE,
         latency,
@@ -188,11 +201,13 @@ def _ranged(estimate: Estimate, unit: str) -> str:
     return f"{_true(estimate.value)} {unit} ({spread})"
 
 
-def _with(value: float, uncertainty: float | None, unit: str, digits: int) -> str:
-    """A value with its uncertainty, where that is known."""
+def _with(
+    value: float, uncertainty: float | None, unit: str, digits: int, of_band: int = 2
+) -> str:
+    """A value with its uncertainty to `of_band` digits, where that is known."""
     if uncertainty is None:
         return show(value, unit, digits)
-    return plus_minus(value, uncertainty, unit)
+    return plus_minus(value, uncertainty, unit, of_band)
 
 
 def _shown(value: float | None, unit: str, digits: int = 3) -> str:

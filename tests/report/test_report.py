@@ -9,6 +9,7 @@ import pytest
 
 from protocols.hold import Hold
 from tactile_lab.conclusion import Table
+from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.plot import spike_train
@@ -174,6 +175,19 @@ def test_the_table_has_one_row_per_trial(demo):
     assert spikes == sorted(spikes)
     assert "10 are needed" in shown.rows[1][-1]
     assert "exceeds the hold of 2 s" in shown.rows[3][-1]
+
+
+def test_levels_within_the_band_of_the_force_are_told_apart(demo):
+    """A search's "96 ± 14 mN" fired, and the next "96 ± 14 mN" did not."""
+    known = ForceUncertainty(absolute=0.0, relative=0.14)
+    levels = 95.625e-3, 96.25e-3, 97.5e-3
+    trials = tuple(replace(demo.trials[0], level=level, label="") for level in levels)
+    shown = trials_table(replace(demo, trials=trials, force_uncertainty=known))
+    at = shown.headings.index("Force")
+    forces = [row[at] for row in shown.rows]
+    assert forces == ["95.6 ± 13.4 mN", "96.2 ± 13.5 mN", "97.5 ± 13.7 mN"]
+    near = trials_table(replace(demo, trials=trials[::2], force_uncertainty=known))
+    assert [row[at] for row in near.rows] == ["96 ± 13 mN", "98 ± 14 mN"]
 
 
 def test_the_table_says_once_why_trials_have_no_time_constant(demo):
