@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import cast
@@ -110,6 +111,13 @@ class CoilThread(InstrumentThread):
     list is loaded, started and watched; the source, or the scope's generator at its
     analogue input, keeps its time.
 
+    Args:
+        coil: the source.
+        clock: the bench's time.
+        stop: asks for the end.
+        lease: ends it where nobody renews that.
+        before_on: called before it is switched on; may raise to prevent it.
+
     Attributes:
         switched_on: the source was told to switch on and not yet off again; until
             `live`, too, nobody knows whether it is.
@@ -131,6 +139,7 @@ class CoilThread(InstrumentThread):
         clock: Clock,
         stop: StopRequest,
         lease: Lease,
+        before_on: Callable[[], None] = lambda: None,
     ) -> None:
         super().__init__("coil", clock)
         self.coil = coil
@@ -142,6 +151,7 @@ class CoilThread(InstrumentThread):
         self.measured: float | None = None
         self._stop = stop
         self._lease = lease
+        self._before_on = before_on
         self._applied: deque[Applied] = deque()
         self._warned = 0
         self._read = float("-inf")
@@ -258,6 +268,7 @@ class CoilThread(InstrumentThread):
         self.coil.beat()
         self._lease.check()
         if self._energise:
+            self._before_on()
             self.switched_on = True  # before it is: its answers may come late
             self.coil.energise()
             self.settings.update(self.coil.settings())

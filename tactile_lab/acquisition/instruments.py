@@ -40,10 +40,20 @@ class Instruments:
     voltages: tuple[VoltageThread, ...] = ()
 
     @classmethod
-    def of(cls, bench: Bench, stop: StopRequest, lease: Lease) -> Instruments:
-        """Threads for what the bench has; none started, nothing opened."""
-        clock = bench.clock
-        coil = CoilThread(bench.coil, clock, stop, lease) if bench.coil else None
+    def of(
+        cls,
+        bench: Bench,
+        stop: StopRequest,
+        lease: Lease,
+        before_on: Callable[[], None],
+    ) -> Instruments:
+        """Threads for what the bench has; none started, nothing opened.
+
+        `before_on` is called before the coil is switched on.
+        """
+        clock, coil = bench.clock, None
+        if bench.coil is not None:
+            coil = CoilThread(bench.coil, clock, stop, lease, before_on)
         scope = ScopeThread(bench.scope, clock) if bench.scope else None
         if coil is not None and scope is not None and bench.generator is not None:
             slew = coil.coil.limits.slew

@@ -40,6 +40,7 @@ class Program:
         drift: judges V_C1 at rest before each trial; None where no trial pushes.
         drive_check: compares current, shunt and field of each trial; None where
             nothing drives the coil.
+        before_on: called before the coil is switched on; may raise to prevent it.
         asked_field: has a person read the field; None where a meter does, or nobody.
     """
 
@@ -56,5 +57,6 @@ class Program:
     coil_lag: float = 0.0
     drift: Drift | None = None
     drive_check: DriveCheck | None = None
+    before_on: Callable[[], None] = lambda: None
     ask: Ask | None = None
     asked_field: AskedField | None = None

@@ -89,7 +89,7 @@ class Runner:
         self._account = Account(bench.clock, journal, emit)
         self._stop = stop
         self._lease = Lease(bench.clock)
-        self.instruments = Instruments.of(bench, stop, self._lease)
+        self.instruments = Instruments.of(bench, stop, self._lease, program.before_on)
         self._pump = Pump(
             program,
             bench.clock,

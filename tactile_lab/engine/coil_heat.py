@@ -1,7 +1,8 @@
 """When a real coil counts as cold, kept where every program on this computer finds it.
 
 One small file for each coil, by its port as the bench file writes it, in the state
-folder. A program that was killed while it heated the coil leaves a file that says so.
+folder. A program that was killed while it heated the coil, or could not switch it off,
+leaves a file that says so.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ class CoilHeat:
     def __init__(self, port: str, limits: CoilLimits) -> None:
         self._limits = limits
         self._longest = self.after(limits.heat)
+        self._alone = self._begun = False
         self.path = kept_of_port("coils", port)
 
     @classmethod
@@ -65,8 +67,48 @@ class CoilHeat:
     def left(self) -> float:
         """Time until it counts as cold, s; 0 where it does.
 
-        A program that was killed with the coil in its hands could not say how hot it
-        left it: the whole heat budget is counted, from now on.
+        Where it is `lost`, the whole heat budget is counted, from now on.
+
+        Raises:
+            LimitError: the file is not one that this program writes.
+        """
+        if (kept := self._kept()) is None:
+            return 0.0
+        heating, same, steady, wall = kept
+        if heating:
+            # who has it drives it, and has its port as well, which says more
+            return self._longest if self.lost else 0.0
+        left = steady - time.monotonic() if same else wall - time.time()
+        return min(max(left, 0.0), self._longest)
+
+    @property
+    def lost(self) -> bool:
+        """Whether its current may flow still, and nobody drives it.
+
+        A program was killed with the coil in its hands, or could not switch it off.
+
+        Raises:
+            LimitError: the file is not one that this program writes.
+        """
+        if (kept := self._kept()) is None or not kept[0]:
+            return False
+        with self._held() as free:
+            return free
+
+    def seen_off(self) -> None:
+        """What was `lost` is off now: the whole heat budget is counted from here.
+
+        Raises:
+            LimitError: the file cannot be written.
+        """
+        self.keep(self._longest)
+
+    def _kept(self) -> tuple[bool, bool, float, float] | None:
+        """What the file holds, if there is one.
+
+        Returns:
+            Whether it is being heated; whether since this start of the computer; from
+            when on it is cold, by the steady and by the wall clock, s.
 
         Raises:
             LimitError: the file is not one that this program writes.
@@ -78,22 +120,14 @@ class CoilHeat:
             if not math.isfinite(steady + wall):
                 raise ValueError("a time that is no number")
         except FileNotFoundError:
-            return 0.0
+            return None
         except (OSError, ValueError, TypeError, KeyError) as reason:
             raise LimitError(
                 f"How warm the coil is cannot be told: {self.path} cannot be read "
                 f"({type(reason).__name__}: {reason}). Once no program has driven the "
                 f"coil for {self._longest:.0f} s, delete the file."
             ) from reason
-        if heating:
-            with self._held() as free:
-                if not free:
-                    return 0.0  # its port is taken as well, which says more
-                self.keep(self._longest)
-            return self._longest
-        same = boot and boot == _boot()
-        left = steady - time.monotonic() if same else wall - time.time()
-        return min(max(left, 0.0), self._longest)
+        return heating, bool(boot) and boot == _boot(), steady, wall
 
     def check(self) -> None:
         """Refuse where how warm the coil is cannot be told, or cannot be kept later.
@@ -106,19 +140,15 @@ class CoilHeat:
         with self._held():
             pass
 
-    @contextmanager
-    def heating(self) -> Iterator[bool]:
-        """While the coil is driven; `keep` says before the end how it is left.
-
-        Gives whether no other program drives it.
+    def begin(self) -> None:
+        """The coil is switched on now: until `kept_while` ends, it counts as `lost`.
 
         Raises:
             LimitError: the file cannot be written.
         """
-        with self._held() as alone:
-            if alone:
-                self.keep(self._longest, heating=True)
-            yield alone
+        if self._alone:  # else its port is taken, too
+            self.keep(self._longest, heating=True)
+            self._begun = True
 
     def keep(self, left: float, *, heating: bool = False) -> None:
         """Keep that it counts as cold in `left` s.
@@ -145,17 +175,22 @@ class CoilHeat:
     ) -> Ending:
         """Drive the coil, and keep how it is left unless another program has it.
 
+        What never began leaves it as it was, or off where it was `lost`; what could
+        not switch it off leaves it `lost`.
+
         Args:
-            drive: does it.
-            left: time until the coil counts as cold, s, after it ended so.
+            drive: does it, and calls `begin` before it switches on.
+            left: time until the coil counts as cold, s, after it ended so, off.
             emit: told where that cannot be kept; the coil's state comes first.
 
         Raises:
-            LimitError: the file cannot be written, and nothing was driven.
+            LimitError: the folder cannot be written, and nothing was driven.
         """
-        with self.heating() as alone:
+        with self._held() as self._alone:
+            kept = self._kept()
+            self._begun = self._alone and kept is not None and kept[0]
             ending = drive()
-            if alone:  # else its port was taken, too
+            if self._begun and ending.off.verified:
                 try:
                     self.keep(left(ending))
                 except LimitError as reason:

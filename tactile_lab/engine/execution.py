@@ -25,7 +25,7 @@ from tactile_lab.acquisition.person import Ask
 from tactile_lab.acquisition.program import SETTLED, Program
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
-from tactile_lab.bench import Bench
+from tactile_lab.bench import Bench, OffReport
 from tactile_lab.drive import Drive
 from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.coil_heat import CoilHeat
@@ -54,6 +54,11 @@ STATUS: dict[events.RunState, Status] = {
 
 LOOK = 0.05
 """Time between two looks whether a wait is over, s."""
+
+LEFT_ON = (
+    "A program before this one may have left its output on: switch the coil source off "
+    "at the instrument."
+)
 
 
 class Execution(Task[Executed]):
@@ -156,7 +161,7 @@ class Execution(Task[Executed]):
             LimitError: how warm the coil is cannot be told or kept.
         """
         keep_scene(self.folder, self.scene)
-        self._let_cool()
+        prevented = self._let_cool()
         began = time.monotonic()
         self._runner = runner = Runner(
             self._program(),
@@ -167,7 +172,7 @@ class Execution(Task[Executed]):
             self._emit,
             *self._others,
         )
-        ending = self._driven(runner)
+        ending = prevented or self._driven(runner)
         took = time.monotonic() - began
         proof: Certificate | None = None
         try:
@@ -186,23 +191,36 @@ class Execution(Task[Executed]):
             took=took,
         )
 
-    def _let_cool(self) -> None:
+    def _let_cool(self) -> Ending | None:
         """Wait until a coil that was heated before is as cold as plans take it to be.
 
-        Who asks to stop ends it.
+        Who asks to stop ends it. How the run ends where the coil may be on still, and
+        cannot be switched off.
         """
-        left = self._heat.left() if self._heat else 0.0
-        if not left:
-            return
+        heat = self._heat
+        if heat is None:
+            return None
+        before = ""
+        try:
+            if heat.lost and not self.stop.requested:
+                self._switch_off()
+                heat.seen_off()
+                before = ", which died or could not switch it off; it is off now"
+        except TactileLabError as error:
+            off = OffReport(False, None, LEFT_ON)
+            return Ending(events.RunState.FAULTED, off, str(error), error)
+        if not (left := heat.left()):
+            return None
         cold = time.monotonic() + left
         text = (
-            f"The coil is still warm from a run before: this one begins in "
+            f"The coil is still warm from a run before{before}. This one begins in "
             f"{left:.0f} s, when it counts as cold, as its plan takes it to be. "
             "Stop ends the waiting."
         )
         self._emit(events.Message("info", text))
         while cold > time.monotonic() and not self.stop.requested:
             time.sleep(LOOK)
+        return None
 
     def _driven(self, runner: Runner) -> Ending:
         """Run, and keep for whoever comes next how warm the coil is left."""
@@ -211,13 +229,25 @@ class Execution(Task[Executed]):
         left = partial(self._left_warm, self._heat)
         return self._heat.kept_while(runner.run, left, self._emit)
 
+    def _switch_off(self) -> None:
+        """Switch off a coil that is not driven but may be on: it would stay warm.
+
+        Raises:
+            TactileLabError: it is not reached, or not verified off.
+        """
+        coil = self.bench.coil
+        assert coil is not None
+        with self.bench.clock.taking_part("coil before"):
+            try:
+                coil.open()  # makes it safe on the way
+            finally:
+                coil.close()
+
     def _left_warm(self, heat: CoilHeat, ending: Ending) -> float:
-        """Time until the coil counts as cold, s."""
+        """Time until the coil, off, counts as cold, s."""
         cost = self.plan.estimate
         if ending.state is events.RunState.COMPLETE:
             return cost.cool_down
-        if self.coil_state.setpoint is None:  # it was never switched on
-            return 0.0
         return heat.after(cost.heat)
 
     def _begin_record(self, stream: Stream | None) -> Recorder:
@@ -282,6 +312,7 @@ class Execution(Task[Executed]):
             coil_lag=scene.bench.magnet.coil_lag,
             drift=self._drift(),
             drive_check=self._drive_check(),
+            before_on=self._heat.begin if self._heat else lambda: None,
             ask=self._ask,
             asked_field=self._asked_field if needed.asked_field else None,
         )

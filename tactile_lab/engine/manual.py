@@ -51,7 +51,7 @@ class ManualControl(Task[Ending]):
 
     Raises:
         SceneError: the bench has no coil.
-        LimitError: how warm its coil is cannot be told.
+        LimitError: how warm its coil is cannot be told or kept.
     """
 
     def __init__(
@@ -68,6 +68,8 @@ class ManualControl(Task[Ending]):
             raise SceneError("This bench has no coil source to drive by hand.")
         self._limits = self.bench.coil.limits
         self._heat = CoilHeat.of(scene, used)
+        if self._heat is not None:
+            self._heat.check()
         self._left = self._heat.left() if self._heat else 0.0
         self._began = self.bench.clock.now()
         self._steps = [(0.0, 0.0)]
@@ -76,7 +78,11 @@ class ManualControl(Task[Ending]):
             holder=("Whoever drives the coil by hand", "a window or script that hangs"),
         )
         self.thread = CoilThread(
-            self.bench.coil, self.bench.clock, self.stop, self._lease
+            self.bench.coil,
+            self.bench.clock,
+            self.stop,
+            self._lease,
+            self._heat.begin if self._heat else lambda: None,
         )
         self._energised = False
 
@@ -119,13 +125,10 @@ class ManualControl(Task[Ending]):
             return Ending.refused(str(reason))
 
     def _left_warm(self, heat: CoilHeat, ending: Ending) -> float:
-        """Time until the coil counts as cold, s; the longest if it may still flow."""
-        limits = self._limits
-        used = limits.heat
-        if ending.off.verified:
-            end = self._since(self.bench.clock.now())
-            flowed = Waveform.stairs(np.array(self._steps), end)
-            used = heat_along(flowed, limits, heat_left(self._left, limits))[0]
+        """Time until the coil counts as cold, s."""
+        limits, end = self._limits, self._since(self.bench.clock.now())
+        flowed = Waveform.stairs(np.array(self._steps), end)
+        used = heat_along(flowed, limits, heat_left(self._left, limits))[0]
         return heat.after(min(used, limits.heat))
 
     def _since(self, time: float) -> float:

@@ -12,11 +12,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import serial
 from served_source import Source
 
-from tactile_lab.acquisition.events import CoilCurrent, Event, Message, RunState
+from tactile_lab.acquisition.ending import Ending
+from tactile_lab.acquisition.events import (
+    CoilCurrent,
+    Event,
+    Message,
+    RunState,
+    StateChanged,
+)
 from tactile_lab.engine.coil_heat import CoilHeat
 from tactile_lab.engine.execution import Execution
+from tactile_lab.engine.manual import ManualControl
 from tactile_lab.errors import LimitError
 from tactile_lab.scene.load import load
 
@@ -179,11 +188,18 @@ def test_a_run_that_was_stopped_hot_leaves_it_hot(source: Source, tmp_path: Path
 
 
 def test_a_program_that_was_killed_counts_as_having_spent_the_budget(source: Source):
-    heat = heat_of(source)
-    with heat.heating():
-        assert heat.left() == 0.0, "whoever drives it has its port"
-    assert heat.left() == pytest.approx(LONGEST)
-    assert 0.0 < heat.left() <= LONGEST, "counted once, from then on"
+    heat, other = heat_of(source), heat_of(source)
+
+    def driven() -> Ending:
+        heat.begin()
+        assert other.left() == 0.0, "whoever drives it has its port"
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        heat.kept_while(driven, lambda _: 0.0, print)
+    assert other.left() == pytest.approx(LONGEST)
+    other.seen_off()
+    assert 0.0 < other.left() <= LONGEST, "counted once, from then on"
 
 
 def test_after_a_restart_or_a_clock_set_back_it_waits_no_longer_than_it_takes(
@@ -223,6 +239,8 @@ def test_a_state_folder_that_cannot_be_written_is_refused_before_a_run_is_made(
     with pytest.raises(LimitError, match="Let XDG_STATE_HOME name a folder"):
         Execution(load("demo", SHORT, str(source.bench)), tmp_path / "runs")
     assert not (tmp_path / "runs").exists()
+    with pytest.raises(LimitError, match="Let XDG_STATE_HOME name a folder"):
+        ManualControl(load("demo", SHORT, str(source.bench)))
 
 
 def test_a_run_that_never_reached_its_coil_leaves_it_cold(
@@ -240,3 +258,97 @@ def test_simulated_coils_are_new_with_each_run(source: Source, tmp_path: Path):
     heat.keep(1000.0)
     heat.path.write_text("broken")
     Execution(scene, tmp_path / "runs").folder.finish("aborted")
+
+
+def test_a_coil_that_may_be_on_is_switched_off_before_it_is_waited_for(
+    source: Source, tmp_path: Path
+):
+    """It waited for minutes, with the current on that it took the coil to be rid of."""
+    told: list[bool] = []
+
+    def heard(event: Event) -> None:
+        if isinstance(event, Message) and "still warm" in event.text:
+            told.append(source.output)
+            one.stop("seen")
+
+    source.bench.write_text(source.bench.read_text().replace('"1 s"', '"600 s"'))
+    killed(source, b"CURR 0.3\nOUTP 1\n")
+    one = Execution(
+        load("demo", SHORT, str(source.bench)), tmp_path / "runs", emit=heard
+    )
+    assert one.run().off.verified
+    assert told == [False]
+    assert heat_of(source).left() > LONGEST - 60.0, "counted from when it was off"
+
+
+def test_a_coil_that_may_be_on_and_is_not_reached_is_not_waited_for(
+    source: Source, tmp_path: Path
+):
+    source.bench.write_text(source.bench.read_text().replace('"1 s"', '"600 s"'))
+    killed(source, b"")
+    one = Execution(load("demo", SHORT, str(source.bench)), tmp_path / "runs")
+    source.served.close()
+    done = one.run()
+    assert done.exit_code == 4
+    assert "cannot be opened" in done.told and "switch the coil source off" in done.told
+    assert heat_of(source).lost
+
+
+def killed(source: Source, said: bytes) -> None:
+    """A program was killed that had the coil, and had said that to its source."""
+    heat = heat_of(source)
+    heat.keep(LONGEST, heating=True)
+    with serial.Serial(source.served.addresses["coil"]) as port:
+        port.write(said)
+        port.flush()
+        while said and not any(d["what"] == "output" for d in source.told()):
+            time.sleep(0.001)
+
+
+def test_a_kill_counts_only_from_when_the_output_is_switched_on(
+    source: Source, tmp_path: Path
+):
+    """A program killed while it connected kept the next from its coil for minutes."""
+    known: dict[str, bool] = {}
+
+    def heard(event: Event) -> None:
+        if isinstance(event, StateChanged):
+            path = heat_of(source).path
+            known[event.state] = path.exists() and '"heating": true' in path.read_text()
+
+    one = Execution(
+        load("demo", SHORT, str(source.bench)), tmp_path / "runs", emit=heard
+    )
+    assert one.run().state is RunState.COMPLETE
+    assert not known[RunState.CONNECTING]
+    assert known[RunState.RUNNING] and known[RunState.STOPPING]
+
+
+def test_a_coil_that_could_not_be_switched_off_is_hot_until_it_is_seen_off(
+    source: Source, tmp_path: Path
+):
+    """It counted as cold soon after the run, though its current still flowed."""
+    long = {**SHORT, "protocol.hold": "60 s"}
+
+    def heard(event: Event) -> None:
+        if isinstance(event, CoilCurrent) and event.setpoint > 0.1:
+            source.served.close()
+
+    bench = source.bench.read_text().replace("0.02 A^2 s", "20 A^2 s")
+    source.bench.write_text(bench)
+    one = Execution(
+        load("demo", long, str(source.bench)), tmp_path / "runs", emit=heard
+    )
+    assert not one.run().off.verified
+    assert heat_of(source).left() == pytest.approx(LONGEST)
+    assert heat_of(source).lost
+
+
+def test_a_coil_that_was_seen_off_by_hand_is_lost_no_more(source: Source):
+    source.bench.write_text(source.bench.read_text().replace('"1 s"', '"600 s"'))
+    killed(source, b"CURR 0.3\nOUTP 1\n")
+    hand = ManualControl(load("demo", SHORT, str(source.bench)))
+    hand.stop("only looked")
+    assert hand.run().off.verified
+    assert not source.output and not heat_of(source).lost
+    assert heat_of(source).left() > LONGEST - 60.0
