@@ -36,6 +36,9 @@ STEADY = 0.2
 SAME_RANGE = 0.1
 """Part of a range by which its name may differ from what it reaches: 2 V from 2.1 V."""
 
+AT_COMPLIANCE = 0.9
+"""Part of the compliance from which on a load may be what holds the voltage down."""
+
 DEVIATING_READINGS = 3
 """Readings in a row that must differ before it counts."""
 
@@ -93,9 +96,9 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
         wire = self._wire
         try:
             wire.connect()
-            self._on = wire.output_is_on()
-            if self._on:
+            if wire.output_is_on():
                 self._take_over()
+                self._on = True  # what is refused stays as it was
             else:
                 wire.set_up(f"{self.name} might be no voltage, or another one")
             self._choose_range()
@@ -179,12 +182,17 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
     def go_to_rest(self) -> RestReport:
         """Ramp to the rest voltage, read it back, and switch off where that is 0 V."""
         if not self._on and self._setpoint in (0.0, None):
-            return RestReport(True, f"The source of {self.name} was never switched on.")
+            told = f"This program did not switch the source of {self.name} on."
+            return RestReport(True, told)
         trouble: list[str] = []
         for _ in range(VERIFICATIONS):
             if not self._wire.reconnected(trouble, RECONNECT):
                 break
             try:
+                if not self._wire.output_is_on():
+                    self._on = False
+                    told = f"The output of {self.name} was off already."
+                    return RestReport(not self.limits.rest, told)
                 for _ in self._ramp(self.limits.rest):
                     self._clock.sleep_until(self._clock.now() + STEP_EVERY)
                 told = f"{self._at_rest()} {self._wire.link.moved}".strip()
@@ -271,13 +279,16 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
             return
         self._deviating += 1
         if self._deviating >= DEVIATING_READINGS:
-            limit = show(self.limits.compliance, "A")
+            most = self.limits.compliance
+            held = abs(current) > AT_COMPLIANCE * most
             raise InterlockError(
                 f"{self.name} is set to {show(wanted, 'V', 6)} but "
                 f"{show(voltage, 'V', 6)} is there, {self._deviating} readings in a "
-                f"row; {show(current, 'A')} flows, the compliance is {limit}. A load "
-                "or a short holds it down, or the tolerance of "
-                f"{show(self.limits.tolerance, 'V')} is too narrow for this source."
+                f"row; {show(current, 'A')} flows, the compliance is "
+                f"{show(most, 'A')}. "
+                f"{'A load or a short holds it down' if held else 'It was set by hand'}"
+                f", or the tolerance of {show(self.limits.tolerance, 'V')} is too "
+                "narrow for this source."
             )
 
     def _at_rest(self) -> str:

@@ -156,7 +156,9 @@ def test_who_is_there_is_asked_of_every_source_and_none_is_switched_on(tmp_path)
     told = {one.role: one.identity for one in found.found}
     assert told["V_GS"].startswith("KEITHLEY") and "V_th" in told
     source = bench.voltage_sources["V_GS"]
-    assert source.go_to_rest().text == "The source of V_GS was never switched on."
+    assert source.go_to_rest().text == (
+        "This program did not switch the source of V_GS on."
+    )
 
 
 def test_the_chip_of_a_source_tells_what_it_is_to_hold_and_what_it_holds(scene):

@@ -232,16 +232,40 @@ def test_an_output_that_is_on_and_not_ours_is_left_alone(wired):
     wired.panel.output_on = True  # it sources a current
     with pytest.raises(RefusedError, match="Switch it off at its front panel"):
         wired.source.open()
+    assert wired.source.go_to_rest().text.startswith("This program did not switch")
     assert wired.panel.output_on
     wired.panel.output_on = False
 
 
 def test_a_voltage_that_no_run_may_leave_is_not_taken_over(wired):
+    """It was refused, to be switched off by hand, and then driven to 0 V."""
     wired.source.open()
     wired.go(1.4)
     wired.source.close()
+    other = wired.again(VoltageLimits(highest=1.0))
     with pytest.raises(RefusedError, match=r"it holds 1\.4 V"):
-        wired.again(VoltageLimits(highest=1.0)).open()
+        other.open()
+    assert other.go_to_rest().text.startswith("This program did not switch")
+    assert wired.panel.output_on and wired.gate.volts["V_GS"] == pytest.approx(1.4)
+
+
+def test_an_output_that_was_switched_off_by_hand_is_known_to_be_off(wired):
+    """Whether it went to rest was unknown, for what is off measures nothing."""
+    wired.source.open()
+    wired.go(1.4)
+    wired.panel.switch(False)
+    report = wired.source.go_to_rest()
+    assert report.verified and "was off already" in report.text
+
+
+def test_a_voltage_set_by_hand_is_no_short(wired):
+    wired.source.open()
+    wired.go(1.4)
+    wired.panel.set(1.2)
+    with pytest.raises(InterlockError, match=r"1\.2\d* V is there.* It was set by hand"):
+        for _ in range(3):
+            wired.source.read()
+            wired.wait(0.2)
 
 
 def test_a_current_source_of_the_same_name_is_no_voltage(wired):
