@@ -26,6 +26,9 @@ MOVED = frozenset({"output", "setpoint_A", "setpoint_V", "range", "temperature"}
 """What is read back and moves by itself in a run: the recorded current tells of the
 coil's, and a teslameter picks its range as the field needs it."""
 
+NO_COIL = OffReport(True, None, "This scene uses no coil.")
+"""How a run that uses none leaves it: nobody looked."""
+
 Wait = Callable[[Callable[[], bool]], None]
 
 
@@ -157,7 +160,7 @@ class Instruments:
             until = thread.clock.now() + CLOSING
             thread.clock.wait_for(lambda t=thread: t.ended, until)  # type: ignore[misc]
         if self.coil is None:
-            return OffReport(True, None, "This scene uses no coil.")
+            return NO_COIL
         if self.coil.off is None:
             return OffReport(
                 False,

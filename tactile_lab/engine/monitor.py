@@ -17,6 +17,7 @@ import numpy as np
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending
+from tactile_lab.acquisition.instruments import NO_COIL
 from tactile_lab.acquisition.program import SETTLED, Program
 from tactile_lab.acquisition.ring import Ring, RingContents
 from tactile_lab.acquisition.runner import Runner
@@ -202,8 +203,8 @@ class Monitor(Task[Ending]):
             "complete",
             held.samples,
             reason=None,
-            coil="The coil was off.",
-            coil_verified_off=True,
+            coil=NO_COIL.text,
+            coil_verified_off=NO_COIL.verified,
             duration_s=held.length,
             took_s=held.length,
             temperature=temperature(self.scene, settings),

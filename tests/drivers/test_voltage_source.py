@@ -262,7 +262,7 @@ def test_a_voltage_set_by_hand_is_no_short(wired):
     wired.source.open()
     wired.go(1.4)
     wired.panel.set(1.2)
-    with pytest.raises(InterlockError, match=r"1\.2\d* V is there.* It was set by hand"):
+    with pytest.raises(InterlockError, match=r"1\.2\d* V is.* It was set by hand"):
         for _ in range(3):
             wired.source.read()
             wired.wait(0.2)

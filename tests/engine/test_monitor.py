@@ -58,6 +58,7 @@ def test_record_keeps_the_last_seconds_as_a_whole_run(tmp_path):
         assert verify(path).sound
     with Run.load(folder) as run:
         assert run.info["notes"]["why"] == "trimmed"
+        assert run.info["coil"] == "This scene uses no coil.", "nobody looked at it"
     report = write(folder, read(folder))
     assert "fires at rest" in report.html.read_text()
     trial = read(folder).results[0]
