@@ -77,6 +77,12 @@ class Pump:
             if self._stop.requested:
                 raise StopAskedError
             self._instruments.raise_failure()
+            if scope is not None and scope.silent > GRACE:
+                raise InstrumentError(
+                    f"The scope's driver has not come back for {scope.silent:.1f} s "
+                    f"(limit {GRACE:g} s): it hangs, as when the scope is unplugged. "
+                    "Check its cable and power, then start again."
+                )
             if done():
                 return
             wake = self._clock.now() + PULSE

@@ -69,6 +69,14 @@ class ScopeThread(InstrumentThread):
         return block
 
     @property
+    def silent(self) -> float:
+        """Time since its driver last came back from a poll, s; 0 where none is due."""
+        stream = self.stream
+        if stream is None or not stream.gapless:  # a whole record may take long
+            return 0.0
+        return self.clock.now() - max(self.polled_until, stream.started)
+
+    @property
     def waiting(self) -> int:
         """Blocks not taken yet."""
         return len(self._queue)

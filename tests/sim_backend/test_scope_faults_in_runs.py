@@ -95,6 +95,19 @@ def test_faults_while_streaming(tmp_path: Path, fault: ScopeFault, reason: str) 
     assert ("samples are missing" in str(verdict.certificate)) is lost
 
 
+def test_a_driver_that_hangs_ends_a_long_hold_too(tmp_path: Path) -> None:
+    """The current flowed on to the end of the hold, and the sample rate was blamed."""
+    long = [*OVERRIDES, "protocol.hold=60 s", 'protocol.levels=["100 mN"]']
+    scene = load("demo", long)
+    hang = ScopeFault(kind="hang", sample=AT, duration=100.0)
+    bench = open_bench(scene, needs(scene), scope_faults=(hang,))
+    done = Execution(scene, tmp_path, bench=bench).run()
+    assert done.state is RunState.FAULTED and done.off.verified
+    assert "driver has not come back" in (done.reason or "")
+    with Run.load(done.folder) as stored:
+        assert stored.current["time"][-1] < 5.0
+
+
 def test_a_loss_that_only_the_last_poll_finds_is_told(tmp_path: Path) -> None:
     sound, library = run_slowly(tmp_path / "sound")
     assert sound.exit_code == 0
