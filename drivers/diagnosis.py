@@ -119,7 +119,8 @@ def picosdk(library: str | None = None) -> Diagnosis:
             remedy='install PicoSDK, or name its file: library = "..." in the bench '
             "file, or the environment variable TACTILE_LAB_PS3000A",
         )
-    return Diagnosis(topic="picosdk", state="ok", text=str(found))
+    file = str(found._name)  # noqa: SLF001  ctypes has no other name for it
+    return Diagnosis(topic="picosdk", state="ok", text=file)
 
 
 def guard() -> Diagnosis:

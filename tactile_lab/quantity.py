@@ -24,6 +24,8 @@ _NUMBER = re.compile(
 )
 DECIMAL_COMMA = re.compile(r"\d,\d")
 """What may be a decimal comma, or none."""
+ROUNDING = 1e-14
+"""Part of a value within which equal numbers differ by how they were computed."""
 _UNIT = r"[fpnµmkMG]?(?:Hz/m?N|Hz|N|V|A|s|T|K|F|Ohm|B|S/s)(?!\w)|[%°]"
 _BETWEEN = re.compile(rf"(?<=[\d?]) (?={_UNIT})|(?<=±) ")
 _FACTOR = re.compile(r"^(?P<symbol>[^\^/ ]+?)(?:\^(?P<power>\d+)|(?P<square>²))?$")
@@ -167,9 +169,10 @@ def show(value: float, unit: str, digits: int = 4) -> str:
 def plus_minus(value: float, half: float, unit: str = "", digits: int = 2) -> str:
     """A value and half of its band (SI) for a person: "50.000 ± 0.025 mN".
 
-    Both have one prefix and end at the same digit, the `digits`-th of the band.
+    Both have one prefix and end at the same digit, the `digits`-th of the band. One
+    that is but the rounding of equal values is no band.
     """
-    if not 0 < half < math.inf:
+    if not ROUNDING * abs(value) < half < math.inf:
         return show(value, unit)
     size = max(abs(value), half)
     prefix = prefix_of(size, unit)

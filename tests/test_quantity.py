@@ -181,6 +181,7 @@ def test_a_number_without_unit_is_answered_with_what_it_may_mean(text, unit, hin
         (1.0, 0.0996, "", "1.00 ± 0.10"),
         (0.05, 0.0, "N", "50 mN"),
         (0.05, math.nan, "N", "50 mN"),
+        (4.506e-3, 8.7e-19, "T", "4.506 mT"),  # standard deviation of equal readings
     ],
 )
 def test_a_value_is_told_as_far_as_it_is_known(value, half, unit, told):

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivers.diagnosis import picosdk
 from drivers.picoscope.scope import PicoScope
 from drivers.picoscope.sdk import ENVIRONMENT, load
 from sim_backend.picoscope.sdk import FUNCTIONS
@@ -175,3 +176,8 @@ def test_the_generator_speaks_the_compiled_abi(
             scope.generator.load(np.ones(5), 2**17 / 20e6)
         with pytest.raises(LimitError, match="does not fit"):
             scope.generator.load(np.zeros(40_000), 2**17 / 20e6)
+
+
+def test_doctor_names_the_file_of_the_library(library_file: Path) -> None:
+    """It said <CDLL '…', handle 56535d173c80 at 0x7f810521f690>."""
+    assert picosdk(str(library_file)).text == str(library_file)
