@@ -252,9 +252,10 @@ class CoilThread(InstrumentThread):
                 )
             if self.off.verified:
                 self._note(Applied(asked, self.clock.now(), 0.0, self.off.current))
+        half_way = self.switched_on and not self.live  # its settings were being sent
         self.switched_on = self.live = False
         try:
-            if self.off.verified and self.opened:
+            if self.off.verified and self.opened and not half_way:
                 self.settings_after = self.coil.settings()
             self.coil.close()
         except InstrumentError as failure:

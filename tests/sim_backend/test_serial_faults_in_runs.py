@@ -175,3 +175,12 @@ def test_a_scene_has_the_plug_pulled_to_practise_on(tmp_path: Path) -> None:
     assert 0.5 < done.duration < 1.5
     kept = load(done.folder / "scene.toml").simulated
     assert kept.coil_unplugged == 1.0
+
+
+def test_a_link_lost_as_it_is_switched_on_changes_no_setting(tmp_path: Path) -> None:
+    """A warning said that the compliance was another at the end: the run had set it."""
+    fault = SerialFault(kind="unplug", amount=0.3, line="^OUTP 1")
+    done, _ = run(tmp_path, fault)
+    assert done.state is RunState.FAULTED and done.off.verified
+    with Run.load(done.folder) as stored:
+        assert stored.info["instruments_changed"] == []
