@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 from drivers.coil import guard_process
-from drivers.serial_line.link import GAP_MARGIN
+from drivers.serial_line.link import GAP_MARGIN, LATEST
 from drivers.serial_line.port import port_settings
 from tactile_lab.errors import InstrumentError
 from tactile_lab.instruments.guard_log import default_log
@@ -203,6 +203,7 @@ def guard_settings(
         "send": said,
         "again": [line + end for line in (wire.preamble, *again)],
         "rest": rest,
+        "latest": wire.timeout + LATEST,
         "query": row.on_query + end,
         "reply_end": wire.reply_end,
         "off_match": row.off_match,

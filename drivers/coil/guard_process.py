@@ -200,6 +200,8 @@ def switch_off(
                     reasons.add(str(reason))
                     log.write(f"trying again: {reason}")
         lines = "again"
+        for port in ports:  # its answers may be late; the lines were sent at once
+            port.timeout = told["latest"]
         time.sleep(RETRY)
     log.write(UNKNOWN)
     return None

@@ -195,6 +195,22 @@ def test_a_source_that_wants_a_rest_before_each_line_is_switched_off(
     assert not source.output_on and source.setpoint == 0.0
 
 
+def test_a_source_that_answers_late_is_known_to_be_off(served, tmp_path, monkeypatch):
+    """Its state was unknown after a minute: each try left before the answer came."""
+    source, server = served
+    monkeypatch.setattr(guard_process, "PATIENCE", 20.0)
+    server.far_end.faults.add(SerialFault(kind="late", amount=0.4, times=None))
+    row = patient(coil_dialect("kepco-bop"), timeout=0.1)
+    source.set_current(0.3)
+    source.switch(True)
+    log = tmp_path / "guard.log"
+    told = guard_settings((server.url,), None, row, row.serial, log)
+    ports = guard_process.prepared(told)
+    off_at = guard_process.switch_off(told, ports, guard_process.GuardLog(str(log)))
+    assert off_at == server.url, log.read_text()
+    assert not source.output_on and source.setpoint == 0.0
+
+
 STARVED = """
 import os, threading, time
 from drivers.coil import guard_process as guard
