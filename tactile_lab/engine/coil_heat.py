@@ -2,13 +2,14 @@
 
 One small file for each coil, by its port as the bench file writes it, in the state
 folder. A program that was killed while it heated the coil, or could not switch it off,
-leaves a file that says so.
+leaves a file that says so; when its guard did, the guard's log tells.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -19,6 +20,7 @@ from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.bench import Bench, CoilLimits
 from tactile_lab.errors import LimitError
+from tactile_lab.instruments.guard_log import switched_off
 from tactile_lab.lab import kept_of_port
 from tactile_lab.planning.heat import cool_down
 from tactile_lab.scene.scene import Scene
@@ -85,7 +87,8 @@ class CoilHeat:
     def lost(self) -> bool:
         """Whether its current may flow still, and nobody drives it.
 
-        A program was killed with the coil in its hands, or could not switch it off.
+        A program was killed with the coil in its hands, or could not switch it off, and
+        neither did its guard.
 
         Raises:
             LimitError: the file is not one that this program writes.
@@ -119,6 +122,7 @@ class CoilHeat:
             steady, wall = float(kept["cold_steady_s"]), float(kept["cold_wall_s"])
             if not math.isfinite(steady + wall):
                 raise ValueError("a time that is no number")
+            owner = int(kept.get("owner", 0))
         except FileNotFoundError:
             return None
         except (OSError, ValueError, TypeError, KeyError) as reason:
@@ -127,7 +131,12 @@ class CoilHeat:
                 f"({type(reason).__name__}: {reason}). Once no program has driven the "
                 f"coil for {self._longest:.0f} s, delete the file."
             ) from reason
-        return heating, bool(boot) and boot == _boot(), steady, wall
+        same = bool(boot) and boot == _boot()
+        off = switched_off(owner, wall - self._longest) if heating else None
+        if off is None:
+            return heating, same, steady, wall
+        # by the clock that nobody sets, it did not cool for longer than since it began
+        return False, same, steady + off - (wall - self._longest), off + self._longest
 
     def check(self) -> None:
         """Refuse where how warm the coil is cannot be told, or cannot be kept later.
@@ -161,6 +170,7 @@ class CoilHeat:
             "cold_steady_s": time.monotonic() + left,
             "cold_wall_s": time.time() + left,
             "boot": _boot(),
+            "owner": os.getpid(),
         }
         what = f"How warm the coil is left cannot be kept in {self.path}"
         advice = "Let XDG_STATE_HOME name a folder that can be written."

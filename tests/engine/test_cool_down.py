@@ -27,6 +27,7 @@ from tactile_lab.engine.coil_heat import CoilHeat
 from tactile_lab.engine.execution import Execution
 from tactile_lab.engine.manual import ManualControl
 from tactile_lab.errors import LimitError
+from tactile_lab.instruments.guard_log import default_log, left_by_guard
 from tactile_lab.scene.load import load
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs a pseudo-terminal")
@@ -97,6 +98,7 @@ import json, sys
 from tactile_lab.acquisition.events import CoilCurrent
 from tactile_lab.engine.manual import ManualControl
 from tactile_lab.errors import LimitError
+from tactile_lab.instruments.guard_log import default_log, left_by_guard
 from tactile_lab.scene.load import load
 
 def heard(event):
@@ -352,3 +354,30 @@ def test_a_coil_that_was_seen_off_by_hand_is_lost_no_more(source: Source):
     assert hand.run().off.verified
     assert not source.output and not heat_of(source).lost
     assert heat_of(source).left() > LONGEST - 60.0
+
+
+def test_what_a_guard_switched_off_cools_since_then(source: Source, tmp_path: Path):
+    """The morning after a kill, the first run waited for a coil that had cooled."""
+    source.bench.write_text(source.bench.read_text().replace('"1 s"', '"600 s"'))
+    killed = begun(source, tmp_path)
+    while not (source.log.exists() and switched_on(source)):
+        time.sleep(0.001)
+    killed.kill()
+    killed.communicate()
+    told = left_by_guard(killed.pid)
+    while told is None:  # a guard that is starved says it late
+        told = left_by_guard(killed.pid)
+    assert told.verified
+    heat = heat_of(source)
+    assert not heat.lost
+    kept = json.loads(heat.path.read_text())
+    for key in ("cold_steady_s", "cold_wall_s"):
+        kept[key] -= 2000.0
+    heat.path.write_text(json.dumps(kept))
+    log = default_log()
+    said = log.read_text()
+    for ago, left in ((1500.0, LONGEST - 1500.0), (3000.0, LONGEST)):
+        moment = time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime(time.time() - ago))
+        log.write_text(re.sub(r"^\S+", moment, said, flags=re.MULTILINE))
+        assert heat.left() == pytest.approx(left, abs=60.0)
+        assert heat.lost == (ago > 2000.0), "another process had its number before"
