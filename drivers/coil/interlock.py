@@ -174,13 +174,10 @@ class Interlock:
         """Why the current must stop at `time` s, or None."""
         return self._unguarded() or self.heat.complaint(time)
 
-    def after_reading(
-        self, asked: float, time: float, measured: float, voltage: Callable[[], float]
-    ) -> str | None:
+    def after_reading(self, asked: float, time: float, measured: float) -> str | None:
         """Why the current must stop once `measured` A were read, or None.
 
-        It was measured between `asked` and `time` s. `voltage` is asked, in V, when the
-        resistance is due to be looked at.
+        It was measured between `asked` and `time` s.
         """
         if (unguarded := self._unguarded()) is not None:
             return unguarded
@@ -190,17 +187,29 @@ class Interlock:
             return self._readback.list_complaint(within, measured, self._player)
         if self._setpoint is None:
             return None
-        rests = time - self._changed > STEADY
-        near = self._setpoint if rests else self._moved_to(measured)
-        why = self._readback.complaint(near, measured, self._limits.compliance)
-        due = rests and time - self._looked >= THERMOMETER_EVERY
-        if why is not None or not due or abs(measured) < THERMOMETER_CURRENT:
-            return why
+        near = self._setpoint if self._rests(time) else self._moved_to(measured)
+        return self._readback.complaint(near, measured, self._limits.compliance)
+
+    def resistance_due(self, time: float, measured: float) -> bool:
+        """Whether the resistance is to be looked at, `measured` A flowing at `time` s.
+
+        Not while the current moves, nor where what flows is not known beforehand.
+        """
+        if self._setpoint is None or not self._rests(time):
+            return False
+        due = time - self._looked >= THERMOMETER_EVERY
+        return due and abs(measured) >= THERMOMETER_CURRENT
+
+    def after_look(self, time: float, voltage: float, measured: float) -> str | None:
+        """Why the current must stop with that voltage, V, and current, A, or None."""
         self._looked = time
-        why = self.thermometer.complaint(voltage(), measured)
+        why = self.thermometer.complaint(voltage, measured)
         if self.thermometer.warning is not None:
             self._warn(self.thermometer.warning)
         return why
+
+    def _rests(self, time: float) -> bool:
+        return time - self._changed > STEADY
 
     def _moved_to(self, measured: float) -> float:
         """The nearest to what was measured, A, of what was passed in `MOVED` s."""

@@ -341,7 +341,9 @@ class CoilSource(SerialInstrument[CoilWire]):
         asked = self._clock.now()
         measured, voltage = self._wire.measured()
         now = self._clock.now()
-        self._trip_on(self._interlock.after_reading(asked, now, measured, voltage))
+        self._trip_on(self._interlock.after_reading(asked, now, measured))
+        if self._interlock.resistance_due(now, measured):
+            self._look_at_resistance(measured, voltage())
         return Reading(now, measured)
 
     @property
@@ -416,6 +418,19 @@ class CoilSource(SerialInstrument[CoilWire]):
         wire.link.end_record()
         if self._guard is not None:
             self._guard.stop()
+
+    def _look_at_resistance(self, current: float, voltage: float) -> None:
+        """Trip on a resistance that is wrong twice: a digit may be lost on the way.
+
+        Raises:
+            InterlockError: it is.
+        """
+        if self._interlock.after_look(self._clock.now(), voltage, current) is None:
+            return
+        self._wire.link.resynchronise()  # nor does an answer belong to another question
+        current, again = self._wire.measured()
+        now = self._clock.now()
+        self._trip_on(self._interlock.after_look(now, again(), current))
 
     def _prepare(self) -> None:
         self._wire.set_compliance(self._limits.compliance)

@@ -348,6 +348,25 @@ def test_a_jump_of_the_resistance_trips(serial_bench, resistance, why):
     assert not it.source.output_on
 
 
+@pytest.mark.parametrize("volts", [0.5, 0.249, 25.0])
+def test_one_wrong_answer_is_no_shorted_coil(serial_bench, volts):
+    """A night's runs ended by a digit: "turns are shorted"."""
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.clock.sleep_until(it.clock.now() + 0.2)
+    it.coil.read_current()
+    told = it.source.measured_voltage
+    wrong = iter([volts])
+    it.source.measured_voltage = lambda: next(wrong, told())
+    it.clock.sleep_until(it.clock.now() + 1.1)
+    it.coil.read_current()
+    assert next(wrong, None) is None
+    assert it.coil.resistance_ratio == pytest.approx(1.0)
+    assert it.source.output_on
+
+
 def test_the_limits_in_force_are_the_narrowest():
     coil = CoilSource(
         KEPCO, "sim://x", CoilLimits(current=50.0, compliance=99.0), SimulatedClock()
