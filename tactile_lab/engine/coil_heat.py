@@ -44,7 +44,7 @@ class CoilHeat:
     """
 
     def __init__(self, port: str, limits: CoilLimits) -> None:
-        self._limits = limits
+        self._port, self._limits = port, limits
         self._longest = self.after(limits.heat)
         self._alone = self._begun = False
         self.path = kept_of_port("coils", port)
@@ -142,12 +142,16 @@ class CoilHeat:
         """Refuse where how warm the coil is cannot be told, or cannot be kept later.
 
         Raises:
-            LimitError: the file is not one that this program writes, or its folder
-                cannot be written.
+            LimitError: the file is not one that this program writes, its folder cannot
+                be written, or another program drives the coil.
         """
-        self.left()
-        with self._held():
-            pass
+        kept = self._kept()
+        with self._held() as free:
+            if not free and kept is not None and kept[0]:
+                raise LimitError(
+                    f"Another program on this computer drives the coil at {self._port}."
+                    " Wait until it has ended, or end it there."
+                )
 
     def begin(self) -> None:
         """The coil is switched on now: until `kept_while` ends, it counts as `lost`.

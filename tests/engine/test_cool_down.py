@@ -144,14 +144,24 @@ def heat_of(source: Source) -> CoilHeat:
     return CoilHeat(coil.port, replace(coil.limits, recovery=600.0))
 
 
-def begun(source: Source, tmp_path: Path) -> "subprocess.Popen[str]":
+def begun(
+    source: Source, tmp_path: Path, changed: dict[str, str] | None = None
+) -> "subprocess.Popen[str]":
     """A run in a program of its own."""
-    changes = [f"--set={key}={json.dumps(value)}" for key, value in SHORT.items()]
+    keys = {**SHORT, **(changed or {})}
+    changes = [f"--set={key}={json.dumps(value)}" for key, value in keys.items()]
     return subprocess.Popen(
         [sys.executable, "-m", "tactile_lab", "run", "demo", "--no-report",
          "--bench", str(source.bench), "--out", str(tmp_path / "runs"), *changes],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
+
+
+def wait_until_on(source: Source, program: "subprocess.Popen[str]") -> None:
+    """Until its output is on; not where the program ends before."""
+    while not (source.log.exists() and switched_on(source)):
+        assert program.poll() is None
+        time.sleep(0.001)
 
 
 def test_another_program_waits_too_until_it_is_stopped(source: Source, tmp_path: Path):
@@ -360,8 +370,7 @@ def test_what_a_guard_switched_off_cools_since_then(source: Source, tmp_path: Pa
     """The morning after a kill, the first run waited for a coil that had cooled."""
     source.bench.write_text(source.bench.read_text().replace('"1 s"', '"600 s"'))
     killed = begun(source, tmp_path)
-    while not (source.log.exists() and switched_on(source)):
-        time.sleep(0.001)
+    wait_until_on(source, killed)
     killed.kill()
     killed.communicate()
     told = left_by_guard(killed.pid)
@@ -381,3 +390,21 @@ def test_what_a_guard_switched_off_cools_since_then(source: Source, tmp_path: Pa
         log.write_text(re.sub(r"^\S+", moment, said, flags=re.MULTILINE))
         assert heat.left() == pytest.approx(left, abs=60.0)
         assert heat.lost == (ago > 2000.0), "another process had its number before"
+
+
+def test_a_coil_that_another_program_drives_is_refused(source: Source, tmp_path: Path):
+    """Two that reach it over a network each switched off what the other drove."""
+    bench = source.bench.read_text().replace("0.02 A^2 s", "20 A^2 s")
+    source.bench.write_text(bench)
+    other = begun(source, tmp_path, {"protocol.hold": "60 s"})
+    try:
+        wait_until_on(source, other)
+        runs = len(list((tmp_path / "runs").iterdir()))
+        for start in (lambda scene: Execution(scene, tmp_path / "runs"), ManualControl):
+            with pytest.raises(LimitError, match=r"Another program .* drives the coil"):
+                start(load("demo", SHORT, str(source.bench)))
+        assert len(list((tmp_path / "runs").iterdir())) == runs
+    finally:
+        other.send_signal(signal.SIGINT)
+        other.communicate()
+    ManualControl(load("demo", SHORT, str(source.bench)))
