@@ -83,6 +83,14 @@ class ScopeUnit:
         self._handle, self._power = max(handle.value, 0), status.OK
         which = "the scope" if self._serial is None else f"scope {self._serial}"
         try:
+            if code == status.NOT_FOUND and self._serial is not None:
+                attached = units(self._calls)
+                if attached and self._serial not in attached:
+                    raise NotFoundError(
+                        f"Scope {self._serial} is not attached, but "
+                        f"{' and '.join(attached)}. Plug it in, or correct serial in "
+                        "[scope] of the bench file."
+                    )
             self.accepted = self._acknowledged(code, f"Opening {which}")
             self.information = {name: self._read(name) for name in INFORMATION}
             if self._serial is None:

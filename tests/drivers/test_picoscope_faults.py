@@ -326,7 +326,7 @@ def test_another_program_has_it() -> None:
 
 def test_another_serial_number_is_asked_for() -> None:
     rig = Rig(serial="AB999/999")
-    rig.fails(NotFoundError, "Opening scope AB999/999")
+    rig.fails(NotFoundError, "Scope AB999/999 is not attached, but SIM04/0001")
     Rig(serial="SIM04/0001").works()
 
 
