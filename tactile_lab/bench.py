@@ -22,6 +22,10 @@ from tactile_lab.voltage_source import VoltageSource
 COPPER = 0.00393
 """Temperature coefficient of copper's resistance at 20 C, 1/K."""
 
+FOUND = "found_A"
+"""What a source's settings call the current that flowed when it was opened, A; they
+lack it where its output was off."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class CoilLimits(SceneTable):

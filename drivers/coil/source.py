@@ -14,7 +14,7 @@ from drivers.coil.list_mode import check_list, check_points, load
 from drivers.coil.wire import CATCH_UP, UNKNOWN, CoilWire
 from drivers.serial_line.instrument import SerialInstrument
 from drivers.serial_line.link import SerialLink, Spy
-from tactile_lab.bench import CoilLimits, OffReport, Reading, SeenOutput
+from tactile_lab.bench import FOUND, CoilLimits, OffReport, Reading, SeenOutput
 from tactile_lab.clock import Clock
 from tactile_lab.current_list import CurrentList
 from tactile_lab.errors import InstrumentError, InterlockError, LimitError, UnsafeError
@@ -70,6 +70,8 @@ class CoilSource(SerialInstrument[CoilWire]):
         self._guard = guard
         super().__init__(CoilWire(link, dialect))
         self._interval = dialect.promised_interval(baud)
+        self._found: float | None = None
+        """What flowed when it was opened, A; None where its output was off."""
         self._setpoint: float | None = None
         self._loaded: CurrentList | None = None
         self._analogue = analogue
@@ -128,13 +130,14 @@ class CoilSource(SerialInstrument[CoilWire]):
             wire.connect()
             self._reached = True
             if wire.output_is_on():
+                self._found = wire.current()
                 went = "" if self._analogue else "ramped to zero and "
                 self.warnings.append(
-                    f"The output was already on at {show(wire.current(), 'A')} when "
+                    f"The output was already on at {show(self._found, 'A')} when "
                     f"connected; it was {went}switched off."
                 )
             else:
-                self._setpoint = 0.0  # nothing flows, nothing to ramp
+                self._found, self._setpoint = None, 0.0  # nothing flows or is to ramp
             report = self.safe_off()
             if not report.verified:
                 why = report.text.removeprefix(UNKNOWN)
@@ -353,12 +356,17 @@ class CoilSource(SerialInstrument[CoilWire]):
 
     def settings(self) -> dict[str, str]:
         """Settings read back, for the run's record."""
-        return self._known | {
-            "compliance_V": f"{self._wire.compliance():g}",
-            "setpoint_A": f"{self._wire.setpoint():g}",
-            "output": "on" if self._wire.output_is_on() else "off",
-            "update_interval_s": f"{self._interval:.6g}",
-        }
+        found = {} if self._found is None else {FOUND: f"{self._found:g}"}
+        return (
+            self._known
+            | found
+            | {
+                "compliance_V": f"{self._wire.compliance():g}",
+                "setpoint_A": f"{self._wire.setpoint():g}",
+                "output": "on" if self._wire.output_is_on() else "off",
+                "update_interval_s": f"{self._interval:.6g}",
+            }
+        )
 
     def beat(self) -> None:
         """Tell the guard that the owning thread is alive."""

@@ -310,6 +310,11 @@ def killed(source: Source, said: bytes) -> None:
     """A program was killed that had the coil, and had said that to its source."""
     heat = heat_of(source)
     heat.keep(LONGEST, heating=True)
+    set_by_hand(source, said)
+
+
+def set_by_hand(source: Source, said: bytes) -> None:
+    """Have the source do what is said, its output on."""
     with serial.Serial(source.served.addresses["coil"]) as port:
         port.write(said)
         port.flush()
@@ -408,3 +413,24 @@ def test_a_coil_that_another_program_drives_is_refused(source: Source, tmp_path:
         other.send_signal(signal.SIGINT)
         other.communicate()
     ManualControl(load("demo", SHORT, str(source.bench)))
+
+
+def test_a_coil_found_on_beyond_its_continuous_current_cools_first(
+    source: Source, tmp_path: Path
+):
+    """It was switched off and pressed with at once, whatever had made it hot."""
+    source.bench.write_text(source.bench.read_text().replace('"1 s"', '"600 s"'))
+    set_by_hand(source, b"CURR 0.3\nOUTP 1\n")
+    done = Execution(load("demo", SHORT, str(source.bench)), tmp_path / "runs").run()
+    assert done.state is RunState.FAULTED and done.off.verified
+    assert "300 mA flowed through the coil when its source was opened" in done.told
+    assert len(switched_on(source)) == 1, "by hand"
+    assert heat_of(source).left() > LONGEST - 60.0
+
+
+def test_a_coil_found_on_within_its_continuous_current_is_used(
+    source: Source, tmp_path: Path
+):
+    set_by_hand(source, b"CURR 0.04\nOUTP 1\n")
+    done = Execution(load("demo", SHORT, str(source.bench)), tmp_path / "runs").run()
+    assert done.state is RunState.COMPLETE
