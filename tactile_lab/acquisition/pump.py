@@ -60,6 +60,7 @@ class Pump:
         self._lease = lease
         self._emit = emit
         self._told = 0.0
+        self._hung: float | None = None
 
     def until(self, done: Callable[[], bool], until: float | None = None) -> None:
         """Do all that comes up until `done()`, or until clock time `until`, s.
@@ -77,12 +78,7 @@ class Pump:
             if self._stop.requested:
                 raise StopAskedError
             self._instruments.raise_failure()
-            if scope is not None and scope.silent > GRACE:
-                raise InstrumentError(
-                    f"The scope's driver has not come back for {scope.silent:.1f} s "
-                    f"(limit {GRACE:g} s): it hangs, as when the scope is unplugged. "
-                    "Check its cable and power, then start again."
-                )
+            self._check_driver()
             if done():
                 return
             wake = self._clock.now() + PULSE
@@ -98,6 +94,26 @@ class Pump:
                     or (scope and self._intake.streaming and scope.waiting > 0)
                 ),
                 wake,
+            )
+
+    def _check_driver(self) -> None:
+        """Give up a scope whose driver has not come back, by two looks apart.
+
+        By one alone a computer that stood still would have done it: nobody ran.
+
+        Raises:
+            InstrumentError: it hangs.
+        """
+        scope, now = self._instruments.scope, self._clock.now()
+        if scope is None or scope.silent <= GRACE:
+            self._hung = None
+            return
+        self._hung = now if self._hung is None else self._hung
+        if now - self._hung >= PULSE / 2:
+            raise InstrumentError(
+                f"The scope's driver has not come back for {scope.silent:.1f} s "
+                f"(limit {GRACE:g} s): it hangs, as when the scope is unplugged. "
+                "Check its cable and power, then start again."
             )
 
     def rest_until(self, when: float) -> None:
