@@ -125,6 +125,7 @@ def pages() -> str:
     whole = dict.fromkeys(sorted(page.stem for page in figures), ".")
     for name, paths in (whole | PAGES).items():
         text = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+        text = re.sub(f"{HASH} to (?={HASH})", "", text)  # run again at the later one
         found = dict.fromkeys(re.findall(HASH, text))
         counts = {one: int(n) for one in found if (n := since(one, paths))}
         told = ", ".join(counts) or "not said"
