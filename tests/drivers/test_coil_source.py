@@ -313,13 +313,18 @@ def test_two_programs_on_one_port(serial_bench):
         second.open()
 
 
-def test_a_hot_coil_warns_then_trips(serial_bench):
-    it = serial_bench
+def at_half_an_ampere(it):
+    """The bench, its coil's resistance looked at for the first time."""
     it.coil.open()
     it.coil.energise()
     it.drive(0.5)
     it.clock.sleep_until(it.clock.now() + 0.2)
     it.coil.read_current()
+    return it
+
+
+def test_a_hot_coil_warns_then_trips(serial_bench):
+    it = at_half_an_ampere(serial_bench)
     for resistance in (5.5, 5.8):
         it.plant.resistance = resistance
         it.clock.sleep_until(it.clock.now() + 1.1)
@@ -335,12 +340,7 @@ def test_a_hot_coil_warns_then_trips(serial_bench):
 
 @pytest.mark.parametrize(("resistance", "why"), [(11.0, "loose"), (3.0, "shorted")])
 def test_a_jump_of_the_resistance_trips(serial_bench, resistance, why):
-    it = serial_bench
-    it.coil.open()
-    it.coil.energise()
-    it.drive(0.5)
-    it.clock.sleep_until(it.clock.now() + 0.2)
-    it.coil.read_current()
+    it = at_half_an_ampere(serial_bench)
     it.plant.resistance = resistance
     it.clock.sleep_until(it.clock.now() + 1.1)
     with pytest.raises(InterlockError, match=why):
@@ -351,12 +351,7 @@ def test_a_jump_of_the_resistance_trips(serial_bench, resistance, why):
 @pytest.mark.parametrize("volts", [0.5, 0.249, 25.0])
 def test_one_wrong_answer_is_no_shorted_coil(serial_bench, volts):
     """A night's runs ended by a digit: "turns are shorted"."""
-    it = serial_bench
-    it.coil.open()
-    it.coil.energise()
-    it.drive(0.5)
-    it.clock.sleep_until(it.clock.now() + 0.2)
-    it.coil.read_current()
+    it = at_half_an_ampere(serial_bench)
     told = it.source.measured_voltage
     wrong = iter([volts])
     it.source.measured_voltage = lambda: next(wrong, told())

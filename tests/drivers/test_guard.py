@@ -177,6 +177,17 @@ def test_off_though_a_person_took_the_source_to_its_front_panel(
     assert "output verified off" in log_of(tmp_path)
 
 
+def assert_switched_off(served, row, tmp_path):
+    """Have a guard switch the served source off, which a row describes."""
+    source, server = served
+    log = tmp_path / "guard.log"
+    told = guard_settings((server.url,), None, row, row.serial, log)
+    ports = guard_process.prepared(told)
+    off_at = guard_process.switch_off(told, ports, guard_process.GuardLog(str(log)))
+    assert off_at == server.url, log.read_text()
+    assert not source.output_on and source.setpoint == 0.0
+
+
 def test_a_source_that_wants_a_rest_before_each_line_is_switched_off(
     served, tmp_path, monkeypatch
 ):
@@ -187,12 +198,7 @@ def test_a_source_that_wants_a_rest_before_each_line_is_switched_off(
     row = patient(coil_dialect("kepco-bop"), timeout=0.3, min_gap=0.1)
     source.set_current(0.3)
     source.switch(True)
-    log = tmp_path / "guard.log"
-    told = guard_settings((server.url,), None, row, row.serial, log)
-    ports = guard_process.prepared(told)
-    off_at = guard_process.switch_off(told, ports, guard_process.GuardLog(str(log)))
-    assert off_at == server.url, log.read_text()
-    assert not source.output_on and source.setpoint == 0.0
+    assert_switched_off(served, row, tmp_path)
 
 
 def test_a_source_that_answers_late_is_known_to_be_off(served, tmp_path, monkeypatch):
@@ -203,12 +209,7 @@ def test_a_source_that_answers_late_is_known_to_be_off(served, tmp_path, monkeyp
     row = patient(coil_dialect("kepco-bop"), timeout=0.1)
     source.set_current(0.3)
     source.switch(True)
-    log = tmp_path / "guard.log"
-    told = guard_settings((server.url,), None, row, row.serial, log)
-    ports = guard_process.prepared(told)
-    off_at = guard_process.switch_off(told, ports, guard_process.GuardLog(str(log)))
-    assert off_at == server.url, log.read_text()
-    assert not source.output_on and source.setpoint == 0.0
+    assert_switched_off(served, row, tmp_path)
 
 
 STARVED = """
