@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -14,12 +15,12 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.quantity import Duration, Pause, Unit, show
+from tactile_lab.quantity import Duration, Force, Pause, Unit, show
 from tactile_lab.stimulus.force import step
 from tactile_lab.stimulus.recovery import Recovering
 from tactile_lab.trial import Trials
 
-PushForce = Annotated[float, Unit("N", above=0.0)]
+Step = Annotated[float, Unit("N", above=0.0)]
 
 FEWEST = 4
 """Critical forces below which no line is drawn through them."""
@@ -31,7 +32,8 @@ class ThresholdDrift(Recovering):
     """Press after press a step less where it fired and a step more where it did not.
 
     Once the critical force is reached the presses go up and down around it and follow
-    it. Each press that fired and a silent one beside it hold it between them.
+    it. Each press that fired and a silent one beside it hold it between them. A sensor
+    that fires when pulled is pulled: more is then farther below 0 N.
     """
 
     name: ClassVar[str] = "threshold_drift"
@@ -39,16 +41,18 @@ class ThresholdDrift(Recovering):
     needs: ClassVar[tuple[str, ...]] = ("spikes",)
     as_wired: ClassVar[bool] = True
 
-    begin: PushForce = Field(default=0.1, description="Force of the first press")
-    step: PushForce = Field(default=1e-3, description="Change from press to press")
+    begin: Force = Field(default=0.1, description="Force of the first press")
+    step: Step = Field(default=1e-3, description="Change from press to press")
     presses: int = Field(default=40, ge=4, le=5000, description="How many presses")
     ramp: Pause = Field(default=0.25, description="Ramp up and ramp down, each")
     hold: Duration = Field(default=1.0, description="Time at each force")
 
     @model_validator(mode="after")
     def _within_reach(self) -> ThresholdDrift:
-        if self.step >= self.begin:
-            raise ValueError(f"step must be below begin, {show(self.begin, 'N')}")
+        if self.step >= abs(self.begin):
+            raise ValueError(
+                f"step must be smaller than begin, {show(self.begin, 'N')}"
+            )
         return self
 
     def wishes(self) -> tuple[str, ...]:
@@ -57,13 +61,13 @@ class ThresholdDrift(Recovering):
 
     def presentations(self) -> Trials:
         """Each press decides the next one."""
-        level = self.begin
+        size, way = abs(self.begin), math.copysign(1.0, self.begin)
         for left in reversed(range(self.presses)):
-            outcome = yield step(level, ramp=self.ramp, hold=self.hold)
+            outcome = yield step(way * size, ramp=self.ramp, hold=self.hold)
             fires = outcome.spike_times.size > 0
             if left:
-                yield from self.recover(level, None)
-            level = max(level - self.step, self.step) if fires else level + self.step
+                yield from self.recover(size, None)
+            size = max(size - self.step, self.step) if fires else size + self.step
 
     def conclude(self, run: Measurement) -> Conclusion:
         """How the critical force moved, by hour and by kelvin."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
@@ -16,12 +17,11 @@ from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
 from tactile_lab.errors import LimitError, NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
-from tactile_lab.quantity import Duration, Pause, Unit, Voltage, plus_minus, show
+from tactile_lab.quantity import Duration, Force, Pause, Unit, Voltage, plus_minus, show
 from tactile_lab.stimulus.force import pause, step
 from tactile_lab.stimulus.recovery import Recovering
 from tactile_lab.trial import Outcome, Trial, Trials
 
-WantedForce = Annotated[float, Unit("N", above=0.0)]
 Margin = Annotated[float, Unit("N", least=0.0)]
 Width = Annotated[float, Unit("V", above=0.0)]
 
@@ -31,7 +31,8 @@ class ThresholdTrim(Recovering):
 
     Each trial presses with that force at another V_GS, which a source meter of the
     bench holds: a spike means that V_GS is too high, silence that it is too low. At the
-    end it is pressed a little less and a little more at the V_GS found, as a check.
+    end it is pressed a little less and a little more at the V_GS found, as a check. A
+    force below 0 N is of a sensor that fires when pulled.
     """
 
     name: ClassVar[str] = "threshold_trim"
@@ -40,7 +41,7 @@ class ThresholdTrim(Recovering):
     needs: ClassVar[tuple[str, ...]] = ("spikes",)
     as_wired: ClassVar[bool] = True
 
-    wanted: WantedForce = Field(default=0.09, description="Critical force to have")
+    wanted: Force = Field(default=0.09, description="Critical force to have")
     low: Voltage = Field(default=1.38, description="V_GS expected to stay silent")
     high: Voltage = Field(default=1.45, description="V_GS expected to fire")
     resolution: Width = Field(default=5e-4, description="Width of V_GS to end with")
@@ -56,9 +57,17 @@ class ThresholdTrim(Recovering):
             raise ValueError(
                 f"low {show(self.low, 'V')} must be below high {show(self.high, 'V')}"
             )
-        if self.margin >= self.wanted:
-            raise ValueError(f"margin must be below wanted, {show(self.wanted, 'N')}")
+        if self.margin >= abs(self.wanted):
+            raise ValueError(
+                f"margin must be smaller than wanted, {show(self.wanted, 'N')}"
+            )
         return self
+
+    @property
+    def _around(self) -> tuple[float, float]:
+        """A little less and a little more than what is wanted, N."""
+        margin = math.copysign(self.margin, self.wanted)
+        return self.wanted - margin, self.wanted + margin
 
     def presentations(self) -> Trials:
         """First at `high`, then at `low`, then at halves of what is left; a check.
@@ -72,14 +81,15 @@ class ThresholdTrim(Recovering):
         if not outcome.spike_times.size:
             raise LimitError(
                 f"At V_GS = {show(high, 'V', 5)} the sensor stays silent under "
-                f"{wanted}, so its critical force is larger for every V_GS allowed. "
-                "Raise protocol.high, within the source's limits, or want more force."
+                f"{wanted}, so its critical force lies farther from 0 N for every V_GS "
+                "allowed. Raise protocol.high, within the source's limits, or want "
+                "more force."
             )
         outcome = yield from self._after_rest(low)
         if outcome.spike_times.size:
             raise LimitError(
                 f"At V_GS = {show(low, 'V', 5)} the sensor fires under {wanted}, so "
-                "its critical force is smaller for every V_GS allowed. Lower "
+                "its critical force lies nearer to 0 N for every V_GS allowed. Lower "
                 "protocol.low, within the source's limits, or want less force."
             )
         while high - low > self.resolution * (1 + 1e-9):
@@ -89,7 +99,7 @@ class ThresholdTrim(Recovering):
             low, high = (low, middle) if fires else (middle, high)
         if self.margin:
             found = (low + high) / 2
-            for force in (self.wanted - self.margin, self.wanted + self.margin):
+            for force in self._around:
                 yield from self._after_rest(found, force)
 
     def _after_rest(
@@ -99,7 +109,7 @@ class ThresholdTrim(Recovering):
 
         The source is set as the recovery begins, so that the circuit settles in it.
         """
-        recovery = self.recovery_time(self.wanted + self.margin)
+        recovery = self.recovery_time(self._around[1])
         yield replace(pause(recovery), voltages={"V_GS": volts})
         return (yield self._press(volts, force))
 
@@ -185,13 +195,11 @@ class ThresholdTrim(Recovering):
 
     def _check(self, run: Measurement, found: TrimmedGate) -> Conclusion:
         """Whether a little less force leaves it silent and a little more fires it."""
-        less, more = (
-            _spikes(run.results, self.wanted + sign * self.margin) for sign in (-1, 1)
-        )
+        less, more = (_spikes(run.results, force) for force in self._around)
         if not self.margin or less is None or more is None:
             return Conclusion(values={"checked": None})
         good = less == 0 and more > 0
-        below, above = (show(self.wanted + sign * self.margin, "N") for sign in (-1, 1))
+        below, above = (show(force, "N") for force in self._around)
         told = (
             f"Checked at {show(found.middle, 'V', 6)}: {below} gives "
             f"{less or 'no'} spikes, {above} {more or 'none'}"

@@ -19,7 +19,8 @@ def followed(protocol, critical, kelvin=None):
     while True:
         spikes = np.empty(0)
         if not trial.pause:
-            if trial.level > critical(pressed):
+            fires_at = critical(pressed)
+            if trial.level / fires_at > 1:
                 spikes = np.array([0.5])
             done.append(
                 MeasuredTrial(
@@ -79,6 +80,18 @@ def test_a_slope_against_temperature_lies_in_its_interval(slope, begin):
     assert plot.x_label == "Temperature" and len(plot.panels[0].series) == 2
 
 
+def test_a_sensor_that_fires_when_pulled_is_followed_below_zero():
+    """All but the sign is as of one that fires when pushed."""
+    push, pull = (ThresholdDrift(begin=way * 0.105, presses=30) for way in (1, -1))
+    pushed, pulled = followed(push, lambda i: 0.1004), followed(pull, lambda i: -0.1004)
+    assert [-t.level for t in pulled.trials] == [t.level for t in pushed.trials]
+    assert len(brackets(pulled)) == len(brackets(pushed)) > 4
+    for one in brackets(pulled):
+        assert abs(one.middle + 0.1004) <= one.half
+    with pytest.raises(ValueError, match="step must be smaller than begin, −1 mN"):
+        ThresholdDrift(begin=-1e-3, step=1e-3)
+
+
 def test_too_few_values_give_no_slope():
     protocol = ThresholdDrift(presses=8)
     found = protocol.conclude(followed(protocol, lambda i: 0.2))
@@ -100,7 +113,7 @@ def test_a_temperature_that_stands_still_is_said():
 
 def test_it_asks_for_the_temperature_and_never_for_no_force():
     assert "temperature" in ThresholdDrift().wishes()
-    run = followed(ThresholdDrift(begin=3e-3, presses=12), lambda i: -1.0)
+    run = followed(ThresholdDrift(begin=3e-3, presses=12), lambda i: 1e-6)
     assert min(t.level for t in run.trials) == 1e-3
-    with pytest.raises(ValueError, match="step must be below begin"):
+    with pytest.raises(ValueError, match="step must be smaller than begin"):
         ThresholdDrift(begin=1e-3, step=1e-3)

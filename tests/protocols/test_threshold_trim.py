@@ -31,7 +31,8 @@ def played(protocol, edge):
         fires = False
         if not trial.pause:
             (volts,) = trial.voltages.values()
-            fires = volts + PER_FORCE * (trial.level - protocol.wanted) > edge
+            more = abs(trial.level) - abs(protocol.wanted)
+            fires = volts + PER_FORCE * more > edge
             told.append((volts, trial.level, fires))
         spikes = np.array([0.5]) if fires else np.empty(0)
         outcome = Outcome(
@@ -47,9 +48,10 @@ def played(protocol, edge):
             return told
 
 
+@pytest.mark.parametrize("wanted", [0.09, -0.09])
 @pytest.mark.parametrize("edge", [1.3803, 1.4, 1.41234, 1.4497])
-def test_the_bracket_closes_on_the_edge_and_stays_within_its_ends(edge):
-    protocol = ThresholdTrim()
+def test_the_bracket_closes_on_the_edge_and_stays_within_its_ends(edge, wanted):
+    protocol = ThresholdTrim(wanted=wanted)
     *pressed, less, more = played(protocol, edge)
     volts = [at for at, _, _ in pressed]
     assert min(volts) == protocol.low and max(volts) == protocol.high
@@ -72,8 +74,8 @@ def test_what_cannot_be_had_is_refused(edge, said):
 def test_parameters_that_contradict_each_other_are_refused():
     with pytest.raises(ValueError, match="must be below high"):
         ThresholdTrim(low=1.5, high=1.4)
-    with pytest.raises(ValueError, match="margin must be below wanted"):
-        ThresholdTrim(wanted=1e-3)
+    with pytest.raises(ValueError, match="margin must be smaller than wanted"):
+        ThresholdTrim(wanted=-1e-3)
 
 
 def measured(presses):
@@ -125,6 +127,14 @@ def test_the_conclusion_tells_V_GS_its_errors_and_the_check():
     }  # fmt: skip
     assert found.budget_line.endswith("; force not stated.")
     assert 'V_GS = "1.40500 V"' in found.text
+
+
+def test_a_pull_is_checked_by_a_weaker_and_a_stronger_one():
+    pulls = [(volts, -force, spikes) for volts, force, spikes in PRESSES]
+    found = ThresholdTrim(wanted=-0.09).conclude(measured(pulls))
+    assert found.values["checked"] is True and not found.missing
+    assert found.values["critical_force_N"] == -0.09
+    assert "−88 mN gives no spikes, −92 mN 2." in found.text
 
 
 def test_a_check_that_fails_is_no_result():
