@@ -16,6 +16,7 @@ from tactile_lab.analysis.rate_force import Bracket, onset
 from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
 from tactile_lab.errors import LimitError, NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
+from tactile_lab.model.circuit import Circuit
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
 from tactile_lab.quantity import Duration, Force, Pause, Unit, show
 from tactile_lab.stimulus.force import step
@@ -119,20 +120,35 @@ def critical_force(run: Measurement, ramp: float, hold: float) -> Conclusion:
         f"{show(found.fires, 'N')} (fires), for a ramp of {ramp:g} s and a hold of "
         f"{hold:g} s."
     )
+    noise = _scatter_of_V_fire(run)
+    known, scatter = run.uncertain(found.middle), _moved_by(run, noise)
     values = {
         "critical_force_N": found.middle,
         "critical_force_half_width_N": found.half_width,
+        "critical_force_scatter_N_95": scatter,
     }
-    known, said = run.uncertain(found.middle), NOT_STATED
+    whole = math.hypot(found.half_width, scatter, known or 0.0)
+    parts, said = ["half the bracket"], []
+    if _is_told(run, noise):
+        parts.append("V_fire's scatter")
+        said.append(
+            f"V_fire scatters by ±{show(noise, 'V', 2)} (95 %) from spike to spike, as "
+            "the intervals in the holds tell: by as much as "
+            f"±{show(scatter, 'N', 2)} a single press may lie beside the others."
+        )
     if known is not None:
-        whole = math.hypot(found.half_width, known)
         values["critical_force_uncertainty_N_95"] = whole
         stated = run.force_uncertainty
-        said = (
-            "With half the bracket and what the bench states of forces, "
-            f"{stated and stated.text}: ±{show(whole, 'N', 2)} (95 %)."
+        parts.append(f"what the bench states of forces, {stated and stated.text}")
+    if len(parts) > 1:
+        *others, last = parts
+        said.append(
+            f"With {', '.join(others)} and {last}: ±{show(whole, 'N', 2)} (95 %)."
         )
-    return Conclusion((sentence, said), values) + _gate(run, found, known or 0.0)
+    if known is None:
+        said.append(NOT_STATED)
+    gate = _gate(run, found, known or 0.0, noise)
+    return Conclusion((sentence, *said), values) + gate
 
 
 def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterator[Plot]:
@@ -159,7 +175,11 @@ def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterato
     bands: tuple[Guide, ...] = ()
     try:
         found = _onset(trials)
-        half = math.hypot(found.half_width, run.uncertain(found.middle) or 0.0)
+        half = math.hypot(
+            found.half_width,
+            _moved_by(run, _scatter_of_V_fire(run)),
+            run.uncertain(found.middle) or 0.0,
+        )
         bands = (Guide(at=found.middle - half, to=found.middle + half),)
     except NotIdentifiableError:
         pass  # no band to draw; the conclusion says why
@@ -217,7 +237,9 @@ def _onset(trials: Sequence[MeasuredTrial]) -> Bracket:
     return onset(forces, [t.response.spikes for t in trials])
 
 
-def _gate(run: Measurement, found: Bracket, force_error: float) -> Conclusion:
+def _gate(
+    run: Measurement, found: Bracket, force_error: float, noise: float
+) -> Conclusion:
     """V_GS from the applied force of the two trials that bracket the onset."""
     from tactile_lab.analysis.operating_point import V_GS_of_onset
 
@@ -227,10 +249,9 @@ def _gate(run: Measurement, found: Bracket, force_error: float) -> Conclusion:
         _applied(run, next(t for t in run.results if t.level == level))
         for level in (found.silent, found.fires)
     )
-    fire, noise = run.circuit.fire_voltage, _scatter_of_V_fire(run)
     displaced = list(run.displaced.values())
     if noise:
-        displaced.append(replace(run.circuit, V_fire=fire + noise))
+        displaced.append(_fires_later(run.circuit, noise))
     try:
         low, high = V_GS_of_onset(run.circuit, silent, fires, force_error, displaced)
     except NotIdentifiableError as reason:
@@ -241,11 +262,8 @@ def _gate(run: Measurement, found: Bracket, force_error: float) -> Conclusion:
         "parameters as believed) explains it; "
         f"{show(run.circuit.V_GS, 'V', 5)} is believed."
     )
-    if noise > TOLD * fire:
-        said += (
-            f" V_fire scatters by ±{show(noise, 'V', 2)} (95 %) from spike to spike, "
-            "as the intervals in the holds tell; that is in it."
-        )
+    if _is_told(run, noise):
+        said += " V_fire's scatter is in it."
     return Conclusion((said,), {"V_GS_low_V": low, "V_GS_high_V": high})
 
 
@@ -275,6 +293,24 @@ def _scatter_of_V_fire(run: Measurement) -> float:
     except NotIdentifiableError:
         return 0.0
     return student_95(freedom) * (found.scatter_V_fire or 0.0)
+
+
+def _fires_later(circuit: Circuit, noise: float) -> Circuit:
+    return replace(circuit, V_fire=circuit.fire_voltage + noise)
+
+
+def _is_told(run: Measurement, noise: float) -> bool:
+    return run.circuit is not None and noise > TOLD * run.circuit.fire_voltage
+
+
+def _moved_by(run: Measurement, noise: float) -> float:
+    """How far the critical force lies off, N, where V_fire does by `noise` V."""
+    from tactile_lab.model.equations import critical_force as held
+
+    if run.circuit is None or not noise:
+        return 0.0
+    moved = held(_fires_later(run.circuit, noise)) - held(run.circuit)
+    return abs(moved) if math.isfinite(moved) else 0.0
 
 
 def _applied(run: Measurement, trial: MeasuredTrial) -> Waveform:

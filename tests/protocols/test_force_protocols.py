@@ -367,6 +367,17 @@ def test_threshold_search_carries_the_scatter_of_V_fire_into_V_GS():
     scattered = replace(most, spike_times=most.spike_times + later)
     found = search.conclude(replace(run, trials=(scattered, *run.trials[1:])))
     assert "V_fire scatters by ±" in found.text
+    assert steady.values["critical_force_scatter_N_95"] < 1e-4
+    scatter = found.values["critical_force_scatter_N_95"]
+    half = math.hypot(found.values["critical_force_half_width_N"], scatter)
+    assert f"and V_fire's scatter: ±{show(half, 'N', 2)} (95 %)" in found.text
+    (plot,) = search.plots(replace(run, trials=(scattered, *run.trials[1:])))
+    (band,) = plot.panels[0].guides
+    assert (band.to - band.at) / 2 == pytest.approx(half)
+    wider = (
+        (found.values["V_GS_high_V"] - found.values["V_GS_low_V"]) / 2 / Circuit().k_F
+    )
+    assert half == pytest.approx(wider, rel=0.1)
     before, after = (
         told.values["V_GS_high_V"] - told.values["V_GS_low_V"]
         for told in (steady, found)
