@@ -293,6 +293,9 @@ def _signed(value: float, unit: str = "V", half: float | None = None) -> str:
 def hum(time: ArrayLike, values: ArrayLike, frequency: float = 50.0) -> float:
     """Amplitude of a sine of that frequency in a trace, in the trace's unit.
 
+    The trace's ends weigh nothing (Hann's window), or hum of another frequency would be
+    seen by where it happens to begin and end.
+
     Args:
         time: s; at least two and a half points a cycle.
         values: any unit.
@@ -308,7 +311,9 @@ def hum(time: ArrayLike, values: ArrayLike, frequency: float = 50.0) -> float:
         )
     phase = 2 * np.pi * frequency * t
     design = np.column_stack([np.sin(phase), np.cos(phase), np.ones_like(t), t - t[0]])
-    sine, cosine = np.linalg.lstsq(design, y, rcond=None)[0][:2]
+    soft = np.hanning(t.size + 2)[1:-1]
+    fitted = np.linalg.lstsq(design * soft[:, np.newaxis], y * soft, rcond=None)[0]
+    sine, cosine = fitted[:2]
     step = float(np.median(np.diff(t)))
     return float(np.hypot(sine, cosine) / np.sinc(frequency * step))
 

@@ -207,6 +207,14 @@ def test_hum_is_measured_in_noise():
         hum(time[::20], trace[::20])
 
 
+@pytest.mark.parametrize("lasts", [0.5, 0.957, 2.0])
+def test_hum_of_another_frequency_is_not_this_one_s(lasts):
+    time = np.arange(0, lasts, 1e-3)
+    other = 0.03 * np.sin(2 * np.pi * 50 * time + 0.5)
+    assert hum(time, other, 60.0) < 1e-4
+    assert hum(time, other, 50.0) == pytest.approx(0.03, rel=0.01)
+
+
 @pytest.mark.parametrize("V_GS", [1.35, 1.4, 1.5])
 def test_the_rest_voltage_gives_v_gs_back(V_GS):
     circuit = Circuit(V_GS=V_GS)
