@@ -90,7 +90,10 @@ class Suspect:
 
     @property
     def text(self) -> str:
-        """What differs, by how much: "V_GS +4 mV (3.6 mV to 4.4 mV, 95 %)"."""
+        """What differs, by how much: "V_GS +4 mV (3.6 mV to 4.4 mV, 95 %)".
+
+        Without the interval where it explains nothing: that is of the noise alone.
+        """
         title, unit = TITLES[self.name]
         values = (self.size.value, self.size.low, self.size.high)
         if unit == "%":
@@ -98,7 +101,8 @@ class Suspect:
         else:
             value, low, high = (show(v, unit, 3) for v in values)
         sign = "+" if self.size.value > 0 else ""
-        return f"{title} {sign}{value} ({low} to {high}, 95 %) from what is believed"
+        known = "" if self.misfit > EXPLAINED else f" ({low} to {high}, 95 %)"
+        return f"{title} {sign}{value}{known} from what is believed"
 
 
 @dataclass(frozen=True)

@@ -115,6 +115,7 @@ def test_what_no_single_suspect_explains_is_pinned_on_none(deviation, other):
     assert found.cause is None
     assert not found.candidates
     assert "cannot be told" in found.text
+    assert "95 %" not in found.text
 
 
 @pytest.mark.parametrize(
