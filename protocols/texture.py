@@ -20,7 +20,7 @@ from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import Duration, Force, Pause, Unit, plus_minus, show
 from tactile_lab.stimulus.force import ForceProtocol
-from tactile_lab.stimulus.indentation import on_indentation
+from tactile_lab.stimulus.indentation import on_indentation, turned_over
 from tactile_lab.trial import Trial, Trials
 
 Length = Annotated[float, Unit("m", above=0.0)]
@@ -36,7 +36,8 @@ class Texture(ForceProtocol):
     """A grating, or a profile of your own, scanned at each of some speeds.
 
     The force is what the profile would give a sensor that moves over it: the force at
-    position x comes at the time x / speed.
+    position x comes at the time x / speed. Half of the scans begin half a period
+    farther on: see `turned_over`.
     """
 
     name: ClassVar[str] = "texture"
@@ -66,20 +67,28 @@ class Texture(ForceProtocol):
     def presentations(self) -> Trials:
         """All scans at one speed, then those at the next."""
         for speed in self.speeds:
-            force, hold = on_indentation(
-                self.base,
-                partial(self._passing, speed),
-                down=self.down,
-                lasts=self.lasts,
-                rest=self.rest,
-                highest=speed / self._length * self._details,
-            )
-            for _ in range(self.passes):
+            forces = [
+                on_indentation(
+                    self.base,
+                    partial(self._passing, speed, begin),
+                    down=self.down,
+                    lasts=self.lasts,
+                    rest=self.rest,
+                    highest=speed / self._length * self._details,
+                )
+                for begin in (self._begins(0), self._begins(1))
+            ]
+            for number in range(self.passes):
+                force, hold = forces[turned_over(number)]
                 label = f"{show(speed, 'm/s')}"
                 yield Trial(force=force, label=label, hold=hold)
 
-    def _passing(self, speed: float, time: FloatArray) -> FloatArray:
-        return self.profile(speed * time)
+    def _begins(self, number: int) -> float:
+        """Where on the profile the scan of that number, from 0, begins, m."""
+        return self._length / 2 if turned_over(number) else 0.0
+
+    def _passing(self, speed: float, begin: float, time: FloatArray) -> FloatArray:
+        return self.profile(begin + speed * time)
 
     def profile(self, position: FloatArray) -> FloatArray:
         """Force above the base, N, at positions, m."""
@@ -117,15 +126,15 @@ class Texture(ForceProtocol):
             return Conclusion(missing=(NOT_SEARCHED,))
         rows, values, missing = [], [], []
         told: dict[bool, list[str]] = {True: [], False: []}
-        for speed, trials in self._scans(run).items():
+        for speed, scans in self._scans(run).items():
             expected = speed / self._length
-            spikes = sum(self._spikes(t).size for t in trials)
+            spikes = sum(self._spikes(t).size for _, t in scans)
             try:
-                found = self.frequency(run, trials, expected)
+                found = self.frequency(run, scans, expected)
             except NotIdentifiableError as why:
                 missing.append(f"No period at {show(speed, 'm/s')}: {why}.")
                 continue
-            half = 0.5 / self._scanned(trials)
+            half = 0.5 / self._scanned(scans)
             period = speed / found
             told[abs(found - expected) <= half].append(show(speed, "m/s"))
             rows.append(
@@ -172,21 +181,21 @@ class Texture(ForceProtocol):
 
     def plots(self, run: Measurement) -> Iterator[Plot]:
         """Spikes of every scan against the position on the profile, by speed."""
-        scans = self._scans(run)
-        if not any(self._spikes(t).size for trials in scans.values() for t in trials):
+        found = self._scans(run)
+        if not any(self._spikes(t).size for scans in found.values() for _, t in scans):
             return
         panels = []
-        for speed, trials in scans.items():
+        for speed, scans in found.items():
             x, y = [], []
-            for number, trial in enumerate(trials, start=1):
+            for number, (begin, trial) in enumerate(scans, start=1):
                 times = self._spikes(trial)
-                x += ((times - self.down) * speed).tolist()
+                x += (begin + (times - self.down) * speed).tolist()
                 y += [float(number)] * times.size
             panels.append(
                 Panel(
                     label="Scan",
                     series=(Series(x=x, y=y, mark="dots"),),
-                    limits=(0.5, len(trials) + 0.5),
+                    limits=(0.5, len(scans) + 0.5),
                     whole=True,
                     note=show(speed, "m/s"),
                     height=1.3,
@@ -203,16 +212,25 @@ class Texture(ForceProtocol):
         )
 
     def frequency(
-        self, run: Measurement, trials: list[MeasuredTrial], expected: float
+        self,
+        run: Measurement,
+        scans: list[tuple[float, MeasuredTrial]],
+        expected: float,
     ) -> float:
         """At which the spikes of some scans repeat themselves most, Hz.
+
+        All count from the profile's beginning, where `expected`, Hz, is its frequency.
 
         Raises:
             NotIdentifiableError: too few spikes, or none that chance does not give.
         """
         low, high = (part * expected for part in SEARCHED)
-        spikes = [self._spikes(trial) - self._landed(run, trial) for trial in trials]
-        found, chance = strongest_frequency(spikes, low, high, self._scanned(trials))
+        passed = expected * self._length
+        spikes = [
+            self._spikes(trial) - self._landed(run, trial) + begin / passed
+            for begin, trial in scans
+        ]
+        found, chance = strongest_frequency(spikes, low, high, self._scanned(scans))
         if chance >= LOCKED:
             raise NotIdentifiableError(
                 f"the spikes of all scans together repeat themselves at no frequency "
@@ -226,22 +244,25 @@ class Texture(ForceProtocol):
         past = np.abs(run.force.at(time)) >= abs(self.base) / 2
         return float(time[np.argmax(past)] - trial.start) if past.any() else 0.0
 
-    def _scans(self, run: Measurement) -> dict[float, list[MeasuredTrial]]:
-        """Completed scans by speed."""
-        found: dict[float, list[MeasuredTrial]] = {}
+    def _scans(
+        self, run: Measurement
+    ) -> dict[float, list[tuple[float, MeasuredTrial]]]:
+        """Completed scans by speed, each with where on the profile it began, m."""
+        found: dict[float, list[tuple[float, MeasuredTrial]]] = {}
         known = {show(speed, "m/s"): speed for speed in self.speeds}
         for trial in run.results:
             if trial.label in known and trial.hold is not None and trial.complete:
-                found.setdefault(known[trial.label], []).append(trial)
+                scans = found.setdefault(known[trial.label], [])
+                scans.append((self._begins(len(scans)), trial))
         return found
 
     def _spikes(self, trial: MeasuredTrial) -> FloatArray:
         """Spikes while the profile acts in full, s from the trial's start."""
         return within(trial.spike_times, trial.hold)
 
-    def _scanned(self, trials: list[MeasuredTrial]) -> float:
+    def _scanned(self, scans: list[tuple[float, MeasuredTrial]]) -> float:
         """Time for which the profile acts in full, s."""
-        start, end = trials[0].hold or (0.0, 0.0)
+        start, end = scans[0][1].hold or (0.0, 0.0)
         return end - start
 
 

@@ -29,7 +29,7 @@ from tactile_lab.stimulus.frequencies import (
     check_rising,
     spaced,
 )
-from tactile_lab.stimulus.indentation import on_indentation
+from tactile_lab.stimulus.indentation import on_indentation, turned_over
 from tactile_lab.trial import Trial, Trials
 
 PushForce = Annotated[float, Unit("N", above=0.0)]
@@ -38,6 +38,7 @@ PushForce = Annotated[float, Unit("N", above=0.0)]
 class Vibration(ForceProtocol):
     """A sine on top of a constant force, at each of some frequencies (as for RA, PC).
 
+    Half of the presentations begin with its other half: see `turned_over`.
     Only a source that keeps time by itself follows it: see `[coil] way`.
     """
 
@@ -79,23 +80,28 @@ class Vibration(ForceProtocol):
         """All presentations of one frequency, then those of the next."""
         labels = {frequency: label for label, frequency in self._by_label.items()}
         for frequency in self.frequencies():
-            force, hold = on_indentation(
-                self.base,
-                partial(self._sine, frequency),
-                down=self.down,
-                lasts=self.lasts,
-                rest=self.rest,
-                highest=frequency,
-            )
-            for _ in range(self.presentations_each):
+            forces = [
+                on_indentation(
+                    self.base,
+                    partial(self._sine, frequency, amplitude),
+                    down=self.down,
+                    lasts=self.lasts,
+                    rest=self.rest,
+                    highest=frequency,
+                )
+                for amplitude in (self.amplitude, -self.amplitude)
+            ]
+            for number in range(self.presentations_each):
+                force, hold = forces[turned_over(number)]
                 yield Trial(force=force, label=labels[frequency], hold=hold)
 
     @property
     def _by_label(self) -> dict[str, float]:
         return by_label(self.frequencies(), 4)
 
-    def _sine(self, frequency: float, time: FloatArray) -> FloatArray:
-        return np.asarray(self.amplitude * np.sin(2 * np.pi * frequency * time))
+    @staticmethod
+    def _sine(frequency: float, amplitude: float, time: FloatArray) -> FloatArray:
+        return np.asarray(amplitude * np.sin(2 * np.pi * frequency * time))
 
     def conclude(self, run: Measurement) -> Conclusion:
         """Vector strength and phase at each frequency."""

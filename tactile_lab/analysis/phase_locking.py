@@ -151,8 +151,8 @@ def strongest_frequency(
 ) -> tuple[float, float]:
     """Frequency at which the spikes of all presentations repeat themselves most.
 
-    All are taken together, so that a rhythm of the sensor's own, which begins at
-    another phase each time, is not taken for one of the stimulus.
+    All are taken together, so that a rhythm of the sensor's own is not taken for one of
+    the stimulus where presentations begin at several phases of it.
 
     Args:
         presentations: spike times of each, s from the same instant of its stimulus.

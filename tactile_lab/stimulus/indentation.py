@@ -78,3 +78,13 @@ def on_indentation(
     if rest > 0:
         wave = wave.then(Waveform.through([(0.0, 0.0), (rest, 0.0)]))
     return wave, (down + soft, down + lasts - soft)
+
+
+def turned_over(number: int) -> bool:
+    """Whether presentation `number`, from 0, begins half a cycle later in its stimulus.
+
+    The sensor has a rhythm of its own, which begins with each indentation. Were all
+    alike, it would come at the same phases each time, and be taken for the stimulus's.
+    Half of them are turned over, by pairs: what the film remembers changes meanwhile.
+    """
+    return (number + 1) // 2 % 2 == 1

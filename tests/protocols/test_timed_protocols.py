@@ -91,6 +91,22 @@ def test_spikes_of_the_model_lock_to_a_strong_vibration():
     assert "° ± " in lagged.tables[0].rows[0][3]
 
 
+@pytest.mark.parametrize("base", [0.14, 0.15, 0.18])
+def test_the_sensor_s_own_rhythm_is_not_taken_for_a_vibration_s(base):
+    """One of 1 µN moves no spike: the sensor fires as under the constant force."""
+    protocol = Vibration(base=base, amplitude=1e-6, count=6, highest=60.0)
+    found = protocol.conclude(answered(protocol))
+    assert "not locked to the vibration at any frequency" in found.text
+    for one in found.plain["phase_locking"]:
+        assert one["vector_strength"]["low_95"] == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.parametrize("period", [0.9e-3, 1e-3])
+def test_the_sensor_s_own_rhythm_is_not_taken_for_a_texture_s(period):
+    protocol = Texture(depth=1e-6, period=period, speeds=(0.01, 0.012))
+    assert "tell the profile" not in protocol.conclude(answered(protocol)).text
+
+
 def test_a_delay_turns_the_phase_and_leaves_the_strength():
     protocol = Vibration(count=1, lowest=20.0, highest=20.0, presentations_each=10)
     (at_once,) = protocol.conclude(answered(protocol)).plain["phase_locking"]
