@@ -98,6 +98,8 @@ def _print(found: FittedRuns) -> None:
         )
         if "tau" in together.estimates and "V_GS" not in together.estimates:
             say("A few uV of V_GS move tau by more than that: fit V_GS as well.")
+    if together.noise:
+        say(together.noise)
     for text in found.warnings:
         warn(text)
 

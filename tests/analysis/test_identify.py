@@ -56,6 +56,13 @@ def test_its_intervals_cover_the_truth():
     assert np.all(hits / repeats > 0.85)
 
 
+@pytest.mark.parametrize(("jitter", "told"), [(1e-6, False), (1e-3, True)])
+def test_noise_as_it_fires_is_told_beyond_the_intervals(jitter, told):
+    _, spikes = run_of(Circuit(), jitter=jitter)
+    found = identify(Circuit(), ("V_GS",), FORCE, FORCE.end, spike_times=spikes)
+    assert ("of scatter as it fires" in found.noise) is told
+
+
 def test_it_says_what_the_run_cannot_tell_apart():
     trace, _ = run_of(Circuit())
     found = identify(Circuit(), ("V_GS", "I_S"), FORCE, FORCE.end, V_C1=trace)
