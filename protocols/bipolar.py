@@ -14,7 +14,7 @@ from pydantic import Field
 from tactile_lab.analysis.decay import Decay, fit_decay
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.arrays import FloatArray
-from tactile_lab.conclusion import NOT_STATED, Conclusion
+from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement, RecordedSignal
 from tactile_lab.model.circuit import Circuit
@@ -97,8 +97,7 @@ class Bipolar(Levels):
             "push to when its force was there.",
             f"Per force: {'; '.join(_sensitivity(c) for c in found)}.",
         ]
-        if run.force_uncertainty is None:
-            said.append(NOT_STATED)
+        said += run.not_stated
         said.append(
             f"The decays give tau = {tau.text('s')}, with V_S as given; one code of "
             "offset of V_C1, its converter's steps and the tolerance of R1 and R2 are "

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from tactile_lab.analysis.error_budget import ErrorBudget
 from tactile_lab.analysis.estimate import Estimate, student_95
-from tactile_lab.conclusion import NOT_STATED, Conclusion
+from tactile_lab.conclusion import Conclusion
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.quantity import Duration, Force, Pause, plus_minus, show
 from tactile_lab.stimulus.force import ForceProtocol, pause, step
@@ -85,8 +85,7 @@ class ForceCheck(ForceProtocol):
                 "readings, and what the bench states of Eq. (2))."
             )
             field = Conclusion((said,), values, budgets=_widest(budgets))
-            if run.force_uncertainty is None:
-                field += Conclusion((NOT_STATED,))
+            field += Conclusion(run.not_stated)
         return field + self._read_over_eq2(run)
 
     def _read_over_eq2(self, run: Measurement) -> Conclusion:

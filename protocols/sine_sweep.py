@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from tactile_lab.analysis.response import Gain, gain
 from tactile_lab.arrays import FloatArray
-from tactile_lab.conclusion import NOT_STATED, Conclusion, Table
+from tactile_lab.conclusion import Conclusion, Table
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
@@ -151,8 +151,7 @@ class SineSweep(ForceProtocol):
         if not found:
             return Conclusion(missing=cut or ("No gain: no frequency was completed.",))
         said = [_summary(found)]
-        if run.force_uncertainty is None:
-            said.append(NOT_STATED)
+        said += run.not_stated
         beside = {e.frequency: e for e in expected}
         pairs = [(g, beside[g.frequency]) for g in found if g.frequency in beside]
         if pairs:

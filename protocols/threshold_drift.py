@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from tactile_lab.analysis.estimate import Estimate, Line
 from tactile_lab.arrays import FloatArray
-from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
+from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import Duration, Force, Pause, Unit, show
@@ -93,7 +93,7 @@ class ThresholdDrift(Recovering):
             f"The critical force lay between {show(forces.min(), 'N')} and "
             f"{show(forces.max(), 'N')}, each known to ±{show(found[0].half, 'N', 2)} "
             f"({len(found)} values).",
-            _stated(run, float(forces.mean())),
+            *_stated(run, float(forces.mean())),
         ]
         by_time = _slope(found, np.array([b.time for b in found]) / HOUR)
         values["drift_N_per_h"] = by_time
@@ -198,15 +198,16 @@ def _bracket(
     )
 
 
-def _stated(run: Measurement, force: float) -> str:
+def _stated(run: Measurement, force: float) -> tuple[str, ...]:
     """What calibration and geometry leave open of all forces together."""
     known = run.uncertain(force)
     if known is None:
-        return NOT_STATED
-    return (
+        return run.not_stated
+    said = (
         f"All of them together may be off by {show(known, 'N', 2)} (95 %), by what "
         "calibration and geometry leave open."
     )
+    return (said, *run.not_stated)
 
 
 def _temperatures(found: list[ForceBracket]) -> FloatArray | None:

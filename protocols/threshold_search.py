@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from tactile_lab.analysis.estimate import student_95
 from tactile_lab.analysis.rate_force import Bracket, onset
-from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
+from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
 from tactile_lab.errors import LimitError, NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.model.circuit import Circuit
@@ -146,7 +146,7 @@ def critical_force(run: Measurement, ramp: float, hold: float) -> Conclusion:
             f"With {', '.join(others)} and {last}: ±{show(whole, 'N', 2)} (95 %)."
         )
     if known is None:
-        said.append(NOT_STATED)
+        said += run.not_stated
     gate = _gate(run, found, known or 0.0, noise)
     return Conclusion((sentence, *said), values) + gate
 

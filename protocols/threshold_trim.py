@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from tactile_lab.analysis.error_budget import ErrorBudget
 from tactile_lab.analysis.rate_force import Bracket
-from tactile_lab.conclusion import NOT_SEARCHED, NOT_STATED, Conclusion
+from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
 from tactile_lab.errors import LimitError, NotIdentifiableError
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
@@ -253,7 +253,7 @@ class TrimmedGate(Bracket):
             budgets["critical force"] = budget
             told = f"The critical force is within ±{show(left, 'N', 2)} of that"
             if known is None:
-                sentences += [f"{told} (k_F of Eqs. (3)-(6)).", NOT_STATED]
+                sentences.append(f"{told} (k_F of Eqs. (3)-(6)).")
             else:
                 both = budget.whole
                 values["critical_force_uncertainty_N_95"] = both
@@ -261,6 +261,7 @@ class TrimmedGate(Bracket):
                     f"{told} (k_F of Eqs. (3)-(6)); with the calibration's "
                     f"uncertainty ±{show(both, 'N', 2)} (95 %)."
                 )
+            sentences += run.not_stated
         return Conclusion(tuple(sentences), values, budgets=budgets)
 
 

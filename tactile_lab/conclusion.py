@@ -16,6 +16,10 @@ WIDTH = 100
 NOT_STATED = (
     "The bench states no uncertainty of force: none is carried into this number."
 )
+GEOMETRY_NOT_STATED = (
+    "The bench states no uncertainty of Eq. (2)'s r, A1, A2 and B1: none is carried "
+    "into this number."
+)
 NOT_SEARCHED = (
     "No result: spikes were not looked for. Put spikes into record.signals; that needs "
     "V_K (or V_C2, by its resets) on a channel."

@@ -38,16 +38,22 @@ class ForceUncertainty:
     Attributes:
         absolute: by the calibration's readings and loop, the same at every force, N.
         relative: by the geometry in Eq. (2), common to all forces, a part of each.
+        unstated: whether the geometry is part of the forces and nobody has stated how
+            well it is known; nothing is carried for it then.
     """
 
     absolute: float
     relative: float
+    unstated: bool = False
 
     @property
     def text(self) -> str:
         """For a person: "±0.5 mN and ±4 % (95 %)"."""
-        absolute = f"{show(self.absolute, 'N', 2)} and ±" if self.absolute else ""
-        return f"±{absolute}{100 * self.relative:.2g} % (95 %)"
+        told = [f"±{show(self.absolute, 'N', 2)}"] if self.absolute else []
+        if self.relative or not told:
+            told.append(f"±{100 * self.relative:.2g} %")
+        missing = "; that of Eq. (2)'s geometry is not stated" if self.unstated else ""
+        return f"{' and '.join(told)} (95 %{missing})"
 
     def of(self, force: ArrayLike) -> FloatArray:
         """Half of the 95 % band of `force` N (any shape), N."""
@@ -140,14 +146,17 @@ class Magnet(SceneTable):
         """What calibration and geometry leave open; None where neither states any."""
         used = self.calibration
         stated = None if used is None else used.uncertainty
-        # a force that was measured owes nothing to the geometry
-        needs_geometry = used is None or used.unit == "T"
-        relative = self.geometry_uncertainty if needs_geometry else 0.0
+        relative = self.geometry_uncertainty if self.by_geometry else 0.0
         if stated is None and not relative:
             return None
         # F(I) - F(0) is the difference of two values of the calibration
         absolute = 0.0 if stated is None else math.sqrt(2) * stated * self._per_unit
-        return ForceUncertainty(absolute, relative or 0.0)
+        return ForceUncertainty(absolute, relative or 0.0, unstated=relative is None)
+
+    @property
+    def by_geometry(self) -> bool:
+        """Whether forces rest on Eq. (2)'s r, A1, A2, B1: not where they were read."""
+        return self.calibration is None or self.calibration.unit == "T"
 
     @property
     def _per_unit(self) -> float:

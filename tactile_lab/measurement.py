@@ -20,6 +20,7 @@ from tactile_lab.analysis.converter import step_bias
 from tactile_lab.analysis.estimate import standard_error
 from tactile_lab.analysis.spike_train import Response, respond
 from tactile_lab.arrays import FloatArray
+from tactile_lab.conclusion import GEOMETRY_NOT_STATED, NOT_STATED
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.model.circuit import Circuit
@@ -445,6 +446,13 @@ class Measurement:
         }
         found.setdefault("temperature", None)
         return found
+
+    @property
+    def not_stated(self) -> tuple[str, ...]:
+        """What to say where no uncertainty of force, or not all, is carried along."""
+        if self.force_uncertainty is None:
+            return (NOT_STATED,)
+        return (GEOMETRY_NOT_STATED,) if self.force_uncertainty.unstated else ()
 
     def uncertain(self, force: float | None) -> float | None:
         """Half of the 95 % band of `force` N, N; None where nothing is stated."""

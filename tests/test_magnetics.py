@@ -124,6 +124,17 @@ def test_what_is_known_of_a_force(calibrated):
     )
     only = replace(MAGNET, geometry_uncertainty=0.05)
     assert only.force_uncertainty.of(0.1) == pytest.approx(5e-3)
+    assert only.force_uncertainty.text == "±5 % (95 %)"
+    # of r, A1, A2 and B1 nobody said that they are exact
+    field_alone = replace(measured, calibration=stated)
+    assert field_alone.force_uncertainty.unstated
+    assert "mN (95 %; that of Eq. (2)'s geometry is not" in (
+        field_alone.force_uncertainty.text
+    )
+    read = calibrated("current_A,force_N\n-1,-0.1\n1,0.1\n")
+    head = replace(read.calibration, head={"uncertainty N (95 %)": "1e-3"}, whole=True)
+    known = replace(read, calibration=head).force_uncertainty
+    assert not known.unstated and known.text == "±1.4 mN (95 %)"
 
 
 @given(st.lists(st.floats(-0.1, 0.15), min_size=1, max_size=6))

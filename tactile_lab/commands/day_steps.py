@@ -83,7 +83,8 @@ STEPS = (
     FirstDayStep(
         "calibrate_field",
         "What field does the coil give?",
-        "a slope near that of the bench file, a loop of a few mT, little drift.",
+        "a slope near that of the bench file, a loop below 5 % of full scale, little "
+        "drift.",
         "a slope of the other sign: turn the probe, or exchange the coil's leads. A "
         "wide loop: a core of hard steel. Drift: let coil and meter warm up.",
         before="Take the NdFeB magnet away and put the probe on the core's axis.",

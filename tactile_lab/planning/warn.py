@@ -227,10 +227,10 @@ def _field(scene: Scene, needed: Needs, drive: Timeline) -> Iterator[str]:
 
 def _magnet(scene: Scene) -> Iterator[str]:
     magnet = scene.bench.magnet
-    if magnet.calibration is None and math.isclose(magnet.A2, A2_PRINTED):
+    if magnet.by_geometry and math.isclose(magnet.A2, A2_PRINTED):
         yield (
             "A2 = 2.25e-3 m² is Table 1's value as printed; a 15 mm x 15 mm core has a "
-            "tenth of it, and a tenth of the force. Measure a calibration."
+            "tenth of it, and a tenth of the force. A balance tells (force_check)."
         )
 
 
@@ -270,17 +270,20 @@ def assumptions(scene: Scene, needed: Needs) -> tuple[str, ...]:
     """What the numbers rest on, one line each."""
     bench, magnet = scene.bench, scene.bench.magnet
     per_ampere = f"{show(magnet.newtons_per_ampere, 'N', 4)} per ampere"
-    if magnet.calibration is not None:
-        lines = [
-            f"force from the calibration {magnet.calibration.path.name}: {per_ampere}"
-        ]
-    else:
+    used = magnet.calibration
+    if magnet.by_geometry:
+        field = (
+            f"B2 = {show(magnet.B2_per_ampere, 'T')} per ampere"
+            if used is None
+            else f"B2 from the calibration {used.path.name}"
+        )
         lines = [
             f"force from Eq. (2): r = {show(magnet.r, 'm')}, "
             f"A1 = {show(magnet.A1, 'm²')}, A2 = {show(magnet.A2, 'm²')}, "
-            f"B1 = {show(magnet.B1, 'T')}, B2 = {show(magnet.B2_per_ampere, 'T')} "
-            f"per ampere: {per_ampere}"
+            f"B1 = {show(magnet.B1, 'T')}, {field}: {per_ampere}"
         ]
+    elif used is not None:
+        lines = [f"force from the calibration {used.path.name}: {per_ampere}"]
     # on a real bench it is a warning: the core may be another than the printed one
     lines += _magnet(scene) if bench.simulated else ()
     lines += _amplitudes(scene, needed)

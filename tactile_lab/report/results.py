@@ -39,7 +39,9 @@ def results(findings: Findings) -> dict[str, Any]:
         if run.force_uncertainty is None
         else {
             "absolute_N": run.force_uncertainty.absolute,
-            "relative": run.force_uncertainty.relative,
+            "relative": None
+            if run.force_uncertainty.unstated
+            else run.force_uncertainty.relative,
         },
         "spikes": sum(t.response.spikes for t in run.results),
         "trials": [_trial(run, t) for t in run.results],

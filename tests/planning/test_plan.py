@@ -129,6 +129,19 @@ def test_the_printed_a2_is_told_and_a_real_core_is_not():
     assert "printed" not in real
 
 
+def test_a_calibration_of_the_field_still_rests_on_the_printed_a2(tmp_path):
+    for unit, rows in (
+        ("field_T", "-1,-0.011\n1,0.011"),
+        ("force_N", "-1,-0.2\n1,0.2"),
+    ):
+        file = tmp_path / f"{unit}.csv"
+        file.write_text(f"current_A,{unit}\n{rows}\n")
+        told = assumed(f'bench.magnet.calibration="{file}"')
+        assert ("Table 1's value as printed" in told) is (unit == "field_T")
+        assert ("r = 6 mm, A1" in told) is (unit == "field_T")
+        assert f"from the calibration {file.name}" in told
+
+
 def test_a_real_bench_is_warned_of_the_printed_a2(tmp_path):
     """There the force may be a tenth; the simulated core is the printed one."""
     bench = tmp_path / "bench.toml"

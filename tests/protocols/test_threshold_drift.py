@@ -109,6 +109,11 @@ def test_a_temperature_that_stands_still_is_said():
     known = replace(run, force_uncertainty=ForceUncertainty(0.0, 0.03))
     told = protocol.conclude(known).text
     assert "All of them together may be off by 3 mN (95 %)" in told
+    assert "A1" not in told
+    bare = replace(run, force_uncertainty=ForceUncertainty(1e-3, 0.0, unstated=True))
+    assert (
+        "no uncertainty of Eq. (2)'s r, A1, A2 and B1" in protocol.conclude(bare).text
+    )
 
 
 def test_it_asks_for_the_temperature_and_never_for_no_force():
