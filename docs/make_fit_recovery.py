@@ -124,13 +124,17 @@ def identified(truth: Truth, wobble: float | None) -> Fit:
     return fit
 
 
-def transfer(seed: int) -> dict[str, Estimate]:
-    """Fit Table 1's transfer curve with 5 % noise."""
-    volts, circuit = np.linspace(0, 2.75, 56), Circuit()
-    line = circuit.I_S * np.exp(volts / (circuit.m * circuit.V_T))
-    noise = np.random.default_rng(seed).normal(0, 0.05, volts.size)
-    fit = fit_transfer(volts, line * np.exp(noise))
-    return {"I_S": fit.I_S, "m": fit.m}
+def transfer(leakage: float) -> Fit:
+    """Fit Table 1's transfer curve with 5 % noise, beside a leakage, A."""
+
+    def fit(seed: int) -> dict[str, Estimate]:
+        volts, circuit = np.linspace(0, 2.75, 56), Circuit()
+        line = circuit.I_S * np.exp(volts / (circuit.m * circuit.V_T)) + leakage
+        noise = np.random.default_rng(seed).normal(0, 0.05, volts.size)
+        found = fit_transfer(volts, line * np.exp(noise))
+        return {"I_S": found.I_S, "m": found.m}
+
+    return fit
 
 
 def decay(seed: int) -> dict[str, Estimate]:
@@ -187,7 +191,9 @@ def cases() -> list[tuple[str, Truth, Fit]]:
     found.append(
         ("circuit, V_C1 and spikes, V_fire ±20 mV", three, identified(three, 0.02))
     )
-    found.append(("transfer curve", {"I_S": 1.216e-12, "m": 5.646}, transfer))
+    for leakage, beside in ((0.0, ""), (1e-11, ", 10 pA leak")):
+        truth = {"I_S": 1.216e-12, "m": 5.646}
+        found.append((f"transfer curve{beside}", truth, transfer(leakage)))
     found.append(("I_DS decay", {"tau": 8.69}, decay))
     return found
 

@@ -16,16 +16,22 @@ FEWEST = 6
 SUBTHRESHOLD_END = 2.75
 ABOVE_FLOOR = 5.0
 """A point counts from this many times the leakage floor up."""
+LEAST = 1e-12
+"""Scatter of ln I_DS below which it is but rounding."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Transfer:
     """A fitted subthreshold line, Eq. (1) with V_DS far above V_T.
 
+    Where no range was asked for, what leaks beside it, or the ammeter is off by, was
+    fitted with it: five times above its floor, leakage is still a fifth of the current.
+
     Attributes:
         I_S: A; its interval is symmetric on the logarithm.
         m: slope factor.
         swing: V per decade, m V_T ln 10.
+        leakage: constant current beside the line, A, either sign; None: none fitted.
         V_T: thermal voltage used, V.
         points: number of points in the fit.
         range: (lowest, highest) V_GS in the fit, V.
@@ -35,6 +41,7 @@ class Transfer:
     I_S: Estimate
     m: Estimate
     swing: Estimate
+    leakage: float | None
     V_T: float
     points: int
     range: tuple[float, float]
@@ -54,14 +61,14 @@ def fit_transfer(
     V_T: float = 0.025,
     between: tuple[float, float] | None = None,
 ) -> Transfer:
-    """Fit ln I_DS = ln I_S + V_GS/(m V_T) in the subthreshold regime.
+    """Fit I_DS = I_S exp(V_GS/(m V_T)) + leakage, on its logarithm, below threshold.
 
     Args:
         V_GS: gate-source voltage, V.
         I_DS: drain current, A; points at or below 0 A are left out.
         V_T: thermal voltage, V.
-        between: V_GS to fit, V; by default up to 2.75 V and from five times the
-            smallest current up, where leakage no longer bends the line.
+        between: V_GS to fit, V, and by a line without leakage; by default up to
+            2.75 V and from five times the smallest current up.
 
     Raises:
         ParameterError: unequal shapes or values that are not finite.
@@ -89,6 +96,9 @@ def fit_transfer(
     if x.size < FEWEST:
         raise NotIdentifiableError(_too_few(int(x.size), volts, between))
     line = Line.through(x, y) if np.ptp(x) > 0 else None
+    leakage: float | None = None
+    if line is not None and line.slope.value > 0 and between is None:
+        line, leakage = _beside_leakage(x, y, line)
     if line is None or line.slope.value <= 0:
         raise NotIdentifiableError(
             f"I_DS does not rise with V_GS in the {x.size} points fitted: check which "
@@ -102,11 +112,42 @@ def fit_transfer(
         ),
         m=_reciprocal(steep, 1 / V_T),
         swing=_reciprocal(steep, math.log(10)),
+        leakage=leakage,
         V_T=V_T,
         points=int(x.size),
         range=(float(x.min()), float(x.max())),
         scatter=line.scatter,
     )
+
+
+def _beside_leakage(x: FloatArray, y: FloatArray, line: Line) -> tuple[Line, float]:
+    """The line of which, and of a constant current, A, y = ln I_DS consists."""
+    from scipy.optimize import least_squares
+
+    middle, unit = float(x.mean()), math.exp(float(y.min()))
+    apart = x - middle
+
+    def left(p: FloatArray) -> FloatArray:
+        alone = np.exp(p[0] + p[1] * apart)
+        return np.asarray(np.log(np.maximum(alone + p[2] * unit, 1e-3 * alone)) - y)
+
+    level = line.offset.value + line.slope.value * middle
+    begin = np.array([level, line.slope.value, 0.0])
+    found = least_squares(left, begin, x_scale="jac", method="lm")
+    freedom = x.size - begin.size
+    scatter = math.sqrt(2 * found.cost / freedom)
+    if scatter < LEAST:
+        return line, 0.0
+    slopes = np.asarray(found.jac, dtype=np.float64)
+    covariance = np.linalg.pinv(slopes.T @ slopes) * scatter**2
+    at_zero = np.array([1.0, -middle, 0.0])
+    level, slope, part = map(float, found.x)
+    errors = np.sqrt([covariance[1, 1], at_zero @ covariance @ at_zero])
+    steep, offset = (
+        Estimate.of(value, float(error), freedom)
+        for value, error in zip((slope, level - slope * middle), errors, strict=True)
+    )
+    return Line(steep, offset, scatter), part * unit
 
 
 def _too_few(

@@ -16,7 +16,7 @@ from tactile_lab.commands.terminal import print_json, refusing, say, warn
     "--between",
     nargs=2,
     metavar="LOW HIGH",
-    help='V_GS to fit, such as --between "0.5 V" "2.5 V".',
+    help='V_GS to fit, by a line without leakage: --between "0.5 V" "2.5 V".',
 )
 @click.option(
     "--figure",
@@ -70,6 +70,7 @@ def command(
                 "lines_left_out": list(read.left_out),
                 "between_V": list(fit.range),
                 "scatter": fit.scatter,
+                "leakage_A": fit.leakage,
                 "V_T_V": fit.V_T,
             }
         )
@@ -82,7 +83,8 @@ def command(
         interval = f"{show(estimate.low, unit)} to {show(estimate.high, unit)}"
         say(f"{name:6} {show(estimate.value, unit)}  ({interval}, 95 %)")
     low, high = fit.range
-    say(f"from {fit.points} points between {low:g} V and {high:g} V")
+    beside = "" if fit.leakage is None else f", {show(fit.leakage, 'A', 2)} beside it"
+    say(f"from {fit.points} points between {low:g} V and {high:g} V{beside}")
     kelvin = fit.V_T / VOLT_PER_KELVIN
     say(
         f"m is for V_T = {show(fit.V_T, 'V')}, Table 1's, which is {kelvin:.1f} K; at "

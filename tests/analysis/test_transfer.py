@@ -42,6 +42,20 @@ def test_its_intervals_cover_the_truth():
     assert np.all((hits / repeats > 0.91) & (hits / repeats < 0.985))
 
 
+@pytest.mark.parametrize("noise", [0.01, 0.05])
+@pytest.mark.parametrize("floor", [-1e-13, 0.0, 1e-12, 1e-11, 1e-10])
+def test_its_intervals_cover_the_truth_beside_what_leaks(floor, noise):
+    """At five times the floor a fifth of the current is not the transistor's."""
+    hits, repeats = np.zeros(2), 60
+    for seed in range(repeats):
+        found = fit_transfer(V, curve(noise=noise, floor=floor, seed=seed))
+        hits += [
+            found.I_S.low <= 1.216e-12 <= found.I_S.high,
+            found.m.low <= 5.646 <= found.m.high,
+        ]
+    assert np.all(hits / repeats > 0.85)
+
+
 def test_a_range_can_be_chosen():
     found = fit_transfer(V, curve(), between=(1.0, 2.0))
     assert found.range == (1.0, 2.0)
