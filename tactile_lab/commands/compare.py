@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from tactile_lab.commands.options import json_option
 from tactile_lab.commands.runs import shown
 from tactile_lab.commands.terminal import print_json, refusing, say
+
+if TYPE_CHECKING:
+    from tactile_lab.store.facts import Fact
 
 NOT_RESULTS = frozenset(
     {"name", "started", "title", "note", "tag", "starred", "status"}
@@ -34,7 +39,7 @@ def command(first: Path, second: Path, as_json: bool) -> None:
         rows = []
         one, other = (grouped(facts(summary(run))) for run in (first, second))
         for key in dict.fromkeys((*one, *other)):
-            a, b = shown(one.get(key, ())), shown(other.get(key, ()))
+            a, b = _beside(one.get(key, ()), other.get(key, ()))
             if key not in NOT_RESULTS and a != b:
                 rows.append((key, a, b))
         found = differences(first, second)
@@ -54,3 +59,14 @@ def command(first: Path, second: Path, as_json: bool) -> None:
     if rows:
         say()
     say(str(found))
+
+
+def _beside(one: Sequence[Fact], other: Sequence[Fact]) -> tuple[str, str]:
+    """The values of one key; with their trials where the two have not the same ones."""
+    if [fact.trial for fact in one] == [fact.trial for fact in other]:
+        return shown(one), shown(other)
+    first, second = (
+        ", ".join(f"{fact.trial}: {shown([fact])}".removeprefix(": ") for fact in found)
+        for found in (one, other)
+    )
+    return first, second

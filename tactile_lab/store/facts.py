@@ -47,12 +47,14 @@ class Fact(NamedTuple):
         number: SI; None for a text.
         text: as a person wrote it; "" for a number.
         unit: SI; "" without.
+        trial: label of the trial it is of; "" of the run.
     """
 
     key: str
     number: float | None
     text: str = ""
     unit: str = ""
+    trial: str = ""
 
 
 def facts(entry: RunSummary) -> list[Fact]:
@@ -131,7 +133,8 @@ def of_results(results: Mapping[str, Any]) -> Iterator[Fact]:
         for key, table, name in _OF_TRIALS:
             if key not in told:
                 found = trial if not table else trial.get(table) or {}
-                yield from _number(key, found.get(name), name)
+                for fact in _number(key, found.get(name), name):
+                    yield fact._replace(trial=str(trial.get("label") or ""))
 
 
 def _numbers(values: Mapping[str, Any]) -> Iterator[Fact]:

@@ -93,3 +93,18 @@ def test_on_the_command_line_values_stand_side_by_side(make, tmp_path):
     assert "results: the same" in done.output
     none = CliRunner().invoke(cli, ["compare", str(old), str(tmp_path / "none")])
     assert none.exit_code == 2 and "none" in none.output
+
+
+def test_a_rate_that_one_trial_lacks_moves_no_other_beside_it(make):
+    """80 mN gave no rate, and that of 120 mN stood beside the other run's of 80 mN."""
+    old, new = make(), make()
+    for folder, rates in ((old, (6.5, 10.5)), (new, (None, 5.5))):
+        trials = [
+            {"label": label, "peak_rate_Hz": rate}
+            for label, rate in zip(("80 mN", "120 mN"), rates, strict=True)
+        ]
+        write_json(folder / "results.json", {"trials": trials})
+    done = CliRunner().invoke(cli, ["compare", str(old), str(new)])
+    (line,) = (x for x in done.output.splitlines() if x.startswith("peak_rate"))
+    told = "80 mN: 6.5 Hz, 120 mN: 10.5 Hz  120 mN: 5.5 Hz"
+    assert line.removeprefix("peak_rate").strip() == told
