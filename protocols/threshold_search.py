@@ -27,6 +27,10 @@ from tactile_lab.waveform import Waveform
 Resolution = Annotated[float, Unit("N", above=0.0)]
 TOLD = 1e-3
 """Part of V_fire by which it has to scatter to be told."""
+SCATTER_UNKNOWN = (
+    "How far V_fire scatters from spike to spike the intervals in the holds do not tell: "
+    "by what a single press may lie beside the others is in none of these numbers."
+)
 
 
 class ThresholdSearch(Recovering):
@@ -120,7 +124,8 @@ def critical_force(run: Measurement, ramp: float, hold: float) -> Conclusion:
         f"{show(found.fires, 'N')} (fires), for a ramp of {ramp:g} s and a hold of "
         f"{hold:g} s."
     )
-    noise = _scatter_of_V_fire(run)
+    told = _scatter_of_V_fire(run)
+    noise = told or 0.0
     known, scatter = run.uncertain(found.middle), _moved_by(run, noise)
     values = {
         "critical_force_N": found.middle,
@@ -136,6 +141,8 @@ def critical_force(run: Measurement, ramp: float, hold: float) -> Conclusion:
             "the intervals in the holds tell: by as much as "
             f"±{show(scatter, 'N', 2)} a single press may lie beside the others."
         )
+    elif told is None:
+        said.append(SCATTER_UNKNOWN)
     if known is not None:
         values["critical_force_uncertainty_N_95"] = whole
         stated = run.force_uncertainty
@@ -177,7 +184,7 @@ def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterato
         found = _onset(trials)
         half = math.hypot(
             found.half_width,
-            _moved_by(run, _scatter_of_V_fire(run)),
+            _moved_by(run, _scatter_of_V_fire(run) or 0.0),
             run.uncertain(found.middle) or 0.0,
         )
         bands = (Guide(at=found.middle - half, to=found.middle + half),)
@@ -267,10 +274,11 @@ def _gate(
     return Conclusion((said,), {"V_GS_low_V": low, "V_GS_high_V": high})
 
 
-def _scatter_of_V_fire(run: Measurement) -> float:
+def _scatter_of_V_fire(run: Measurement) -> float | None:
     """How far V_fire of a single press may lie from its mean, V (95 %).
 
-    From the intervals within the holds; 0 where they are too few to tell.
+    From the intervals within the holds; None where they do not tell: too few of them,
+    or of a T1 that saturates.
     """
     from tactile_lab.analysis.circuit_adaptation import FOLLOWED
     from tactile_lab.analysis.evidence import LONGEST
@@ -284,14 +292,14 @@ def _scatter_of_V_fire(run: Measurement) -> float:
             end = trial.start + trial.hold[1]
             held |= (spikes >= begin + FOLLOWED) & (spikes <= end)
     freedom = int(np.count_nonzero(np.diff(spikes[held]) <= LONGEST)) - 1
-    if circuit is None or freedom < 1:
-        return 0.0
+    if circuit is None or circuit.saturation or freedom < 1:
+        return None
     try:
         found = identify(
             circuit, ("V_GS",), run.force, run.duration, spike_times=spikes[held]
         )
     except NotIdentifiableError:
-        return 0.0
+        return None
     return student_95(freedom) * (found.scatter_V_fire or 0.0)
 
 
