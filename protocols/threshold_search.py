@@ -28,8 +28,8 @@ Resolution = Annotated[float, Unit("N", above=0.0)]
 TOLD = 1e-3
 """Part of V_fire by which it has to scatter to be told."""
 SCATTER_UNKNOWN = (
-    "How far V_fire scatters from spike to spike the intervals in the holds do not tell: "
-    "by what a single press may lie beside the others is in none of these numbers."
+    "The intervals in the holds do not tell how far V_fire scatters from spike to "
+    "spike: by what a single press may lie off for it is in none of these numbers."
 )
 
 

@@ -388,12 +388,12 @@ def test_threshold_search_carries_the_scatter_of_V_fire_into_V_GS():
 def test_a_scatter_that_is_not_known_is_told_as_such():
     steps = [pulse(0.14), recovery(), pulse(0.0965), recovery(), pulse(0.0975)]
     run, search = modelled("threshold_search", steps), ThresholdSearch()
-    assert "do not tell" not in search.conclude(run).text
+    assert "do not tell how far V_fire" not in search.conclude(run).text
     saturating = replace(run, circuit=replace(run.circuit, saturation=True))
-    assert "do not tell" in search.conclude(saturating).text
+    assert "do not tell how far V_fire" in search.conclude(saturating).text
     alone = replace(run.trials[0], spike_times=run.trials[0].spike_times[:1])
     few = replace(run, trials=(alone, *run.trials[1:]))
-    assert "do not tell" in search.conclude(few).text
+    assert "do not tell how far V_fire" in search.conclude(few).text
 
 
 @pytest.mark.parametrize(

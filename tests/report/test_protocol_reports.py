@@ -227,4 +227,4 @@ def test_what_a_report_says_of_adaptation_finds_its_run(tmp_path):
     write_json(tmp_path / "results.json", {"trials": trials})
     found = grouped(facts(RunSummary(folder=tmp_path, name="pushed")))
     tau = trials[0]["circuit_adaptation"]["tau_s"]["value"]
-    assert found["tau"] == [("tau", tau, "", "s")]
+    assert found["tau"] == [("tau", tau, "", "s", "160 mN")]
