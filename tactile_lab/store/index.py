@@ -17,7 +17,7 @@ from tactile_lab.store.facts import KNOWN, Fact
 from tactile_lab.store.where import Condition, condition
 
 FILE = ".index.sqlite"
-VERSION = 3
+VERSION = 4
 """Of the tables; another one is thrown away."""
 PATIENCE = 2.0
 """Longest wait for another program that writes the index, s."""
@@ -25,12 +25,13 @@ _TABLES = f"""
 CREATE TABLE runs (run INTEGER PRIMARY KEY, name TEXT UNIQUE, stamp TEXT, entry TEXT);
 CREATE TABLE facts (
     run INTEGER, place INTEGER, key TEXT, number REAL, text TEXT, folded TEXT,
-    unit TEXT, PRIMARY KEY (run, place)
+    unit TEXT, trial TEXT, PRIMARY KEY (run, place)
 ) WITHOUT ROWID;
 CREATE INDEX by_number ON facts (key, unit, number);
 CREATE INDEX by_text ON facts (key, folded);
 PRAGMA user_version = {VERSION};
 """
+_FACT = ", ".join(Fact._fields)
 _RUN = "(SELECT run FROM runs WHERE name = ?)"
 _KEYS = """
 WITH RECURSIVE found (key) AS (
@@ -87,10 +88,11 @@ class Index:
                     (name, now[name], json.dumps(entry, default=str)),
                 ).lastrowid
                 self._base.executemany(
-                    "INSERT INTO facts VALUES (?, ?, ?, ?, ?, ?, ?)",
+                    f"INSERT INTO facts (run, place, folded, {_FACT}) "
+                    "VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
                     (
-                        (run, place, f.key, f.number, f.text, _folded(f), f.unit)
-                        for place, f in enumerate(facts)
+                        (run, place, fact.text.casefold(), *fact)
+                        for place, fact in enumerate(facts)
                     ),
                 )
 
@@ -124,21 +126,17 @@ class Index:
         if key is not None:
             found: dict[str, list[Fact]] = {name: [] for name in names}
             asked = (
-                "SELECT name, key, number, text, unit FROM facts JOIN runs USING (run) "
+                f"SELECT name, {_FACT} FROM facts JOIN runs USING (run) "
                 "WHERE key = ? ORDER BY run, place"
             )
             for name, *fact in self._base.execute(asked, (key,)):
                 found.get(name, []).append(Fact._make(fact))
             return found
-        asked = f"SELECT key, number, text, unit FROM facts WHERE run = {_RUN}"
+        asked = f"SELECT {_FACT} FROM facts WHERE run = {_RUN}"
         return {
             name: list(map(Fact._make, self._base.execute(asked, (name,))))
             for name in names
         }
-
-
-def _folded(fact: Fact) -> str:
-    return fact.text.casefold()
 
 
 def _opened(file: Path | None) -> sqlite3.Connection:
