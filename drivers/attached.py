@@ -16,7 +16,6 @@ from drivers.picoscope.sdk import load
 from drivers.picoscope.sdk_calls import LibraryCalls
 from drivers.picoscope.unit import units
 from drivers.serial_line.link import SerialLink
-from drivers.serial_line.port_names import lasting_name
 from drivers.teslameter import Teslameter
 from drivers.thermometer import Thermometer
 from drivers.usb_presence import present
@@ -32,6 +31,7 @@ from tactile_lab.instruments.dialects import (
     thermometer_dialect,
     voltage_dialect,
 )
+from tactile_lab.instruments.port import lasting_name
 from tactile_lab.instruments.serial_dialect import SerialDialect, SerialSettings
 from tactile_lab.voltage_source import VoltageLimits
 

@@ -23,7 +23,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
-from urllib.parse import quote
 
 from tactile_lab.columns import read_text
 from tactile_lab.errors import SceneError, choices
@@ -145,11 +144,6 @@ def state_folder() -> Path:
     state = os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA")
     folder = Path(state) if state else Path.home() / ".local" / "state"
     return folder / "tactile-lab"
-
-
-def kept_of_port(kind: str, port: str) -> Path:
-    """Where they keep one `kind` of what is known of a port as a bench file has it."""
-    return state_folder() / kind / f"{quote(port, safe='')}.json"
 
 
 def lab() -> Lab:

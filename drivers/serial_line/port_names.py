@@ -1,32 +1,14 @@
-"""Names of one serial port: the bench file's, and the adapter's own, which stays.
-
-Linux numbers adapters as they come: `/dev/ttyUSB0` may be `/dev/ttyUSB1` once its cable
-was pulled and put back, and another's. Under `/dev/serial/by-id` each has a name by its
-serial number.
-"""
+"""Names of one serial port: the bench file's, and the adapter's own, which stays."""
 
 from __future__ import annotations
 
 import json
 import os
 from contextlib import suppress
-from pathlib import Path
 
 from tactile_lab.errors import RecordingError
-from tactile_lab.lab import kept_of_port
+from tactile_lab.instruments.port import kept_of_port, lasting_name
 from tactile_lab.whole_file import write_text
-
-BY_ID = Path("/dev/serial/by-id")
-"""Where Linux names serial ports by their adapters."""
-
-
-def lasting_name(port: str) -> str | None:
-    """Name of a port by the serial number of its adapter, where the system has one."""
-    if not BY_ID.is_dir():
-        return None
-    real = os.path.realpath(port)
-    names = (one for one in sorted(BY_ID.iterdir()) if os.path.realpath(one) == real)
-    return next(map(str, names), None)
 
 
 class PortNames:

@@ -1,8 +1,9 @@
 """When a real coil counts as cold, kept where every program on this computer finds it.
 
-One small file for each coil, by its port as the bench file writes it, in the state
-folder. A program that was killed while it heated the coil, or could not switch it off,
-leaves a file that says so; when its guard did, the guard's log tells.
+One small file for each coil in the state folder, by its port: by the name that stays
+where the system has one, or a coil that two bench files name differently were two. A
+program that was killed while it heated the coil, or could not switch it off, leaves a
+file that says so; when its guard did, the guard's log tells.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from tactile_lab.acquisition.ending import Ending
 from tactile_lab.bench import Bench, CoilLimits
 from tactile_lab.errors import LimitError
 from tactile_lab.instruments.guard_log import switched_off
-from tactile_lab.lab import kept_of_port
+from tactile_lab.instruments.port import kept_of_port, lasting_name
 from tactile_lab.planning.heat import cool_down
 from tactile_lab.scene.scene import Scene
 from tactile_lab.store.folder import lock
@@ -47,7 +48,7 @@ class CoilHeat:
         self._port, self._limits = port, limits
         self._longest = self.after(limits.heat)
         self._alone = self._begun = False
-        self.path = kept_of_port("coils", port)
+        self.path = kept_of_port("coils", lasting_name(port) or port)
 
     @classmethod
     def of(cls, scene: Scene, bench: Bench) -> CoilHeat | None:

@@ -14,8 +14,6 @@ import pytest
 from patient import patient
 
 from drivers.coil.source import CoilSource
-from drivers.serial_line import port_names
-from drivers.serial_line.port_names import lasting_name
 from drivers.teslameter import Teslameter
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.servers import PtyServer
@@ -24,7 +22,9 @@ from sim_backend.teslameter import meter_far_end
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
 from tactile_lab.errors import BadReplyError, LinkLostError, NotFoundError
+from tactile_lab.instruments import port as ports
 from tactile_lab.instruments.dialects import coil_dialect, teslameter_dialect
+from tactile_lab.instruments.port import lasting_name
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")
 
@@ -83,7 +83,7 @@ class Stranger(SimCoilSource):
 def plugs(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     made = Plugs(tmp_path)
-    monkeypatch.setattr(port_names, "BY_ID", made.by_id)
+    monkeypatch.setattr(ports, "BY_ID", made.by_id)
     yield made
     made.close()
 
@@ -101,7 +101,7 @@ def test_a_port_is_named_so_that_the_name_stays(plugs, source, monkeypatch, tmp_
     port = plugs.put(source, "ttyUSB0", "usb-FTDI_AB12-if00")
     assert lasting_name(port) == str(plugs.by_id / "usb-FTDI_AB12-if00")
     assert lasting_name("/dev/null") is None
-    monkeypatch.setattr(port_names, "BY_ID", tmp_path / "no such")
+    monkeypatch.setattr(ports, "BY_ID", tmp_path / "no such")
     assert lasting_name(port) is None
 
 
@@ -192,13 +192,13 @@ import sys, time
 from pathlib import Path
 from drivers.coil import guard
 from drivers.coil.source import CoilSource
-from drivers.serial_line import port_names
 from patient import patient
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import RealClock
+from tactile_lab.instruments import port
 from tactile_lab.instruments.dialects import coil_dialect
 guard.SILENCE = 60.0
-port_names.BY_ID = Path(sys.argv[2])
+port.BY_ID = Path(sys.argv[2])
 coil = CoilSource(
     patient(coil_dialect("kepco-bop"), 0.5), sys.argv[1], CoilLimits(), RealClock()
 )

@@ -27,6 +27,7 @@ from tactile_lab.engine.coil_heat import CoilHeat
 from tactile_lab.engine.execution import Execution
 from tactile_lab.engine.manual import ManualControl
 from tactile_lab.errors import LimitError
+from tactile_lab.instruments import port
 from tactile_lab.instruments.guard_log import default_log, left_by_guard
 from tactile_lab.scene.load import load
 
@@ -133,6 +134,19 @@ def test_what_was_heated_by_hand_is_hot_for_the_next_program(source: Source):
     assert "still warm: 300 mA may flow in" in first and "50 mA at most" in first
     assert second == "True"
     assert len(switched_on(source)) == 1
+
+
+def test_a_coil_is_the_same_by_each_name_of_its_port(source, tmp_path, monkeypatch):
+    """One that /dev/ttyUSB0 had heated was cold for a bench file that names its id."""
+    by_id = tmp_path / "by-id"
+    by_id.mkdir()
+    named = by_id / "usb-FTDI_AB12-if00"
+    named.symlink_to(load("demo", SHORT, str(source.bench)).bench.coil.port)
+    monkeypatch.setattr(port, "BY_ID", by_id)
+    heat = heat_of(source)
+    heat.keep(300.0)
+    limits = replace(load("demo").bench.coil.limits, recovery=600.0)
+    assert CoilHeat(str(named), limits).left() > 290.0
 
 
 LONGEST = 600.0 * math.log(100)
