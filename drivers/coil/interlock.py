@@ -33,6 +33,9 @@ THERMOMETER_CURRENT = 0.2
 WARM, HOT, LOOSE, SHORTED = 1.15, 1.24, 2.0, 0.7
 """Ratios to the cold resistance: warns, trips, open lead, shorted turns."""
 
+ALIKE = 0.05
+"""Part by which two looks at a cold coil may differ: one wrong digit is more."""
+
 NO_RESISTANCE = 0.05
 """Resistance below which there is no coil, Ohm."""
 
@@ -347,14 +350,16 @@ class WindingThermometer:
     """Temperature of the copper from its resistance, V/I at a steady current.
 
     Attributes:
-        cold: resistance at 20 C, Ohm; the first reading where it was not given.
-        ratio: last resistance over `cold`; None before the first reading.
+        cold: resistance at 20 C, Ohm; where it was not given, the first reading that
+            the next one agrees with.
+        ratio: last resistance over `cold`; None until that is known.
         warning: told once, when the coil has become warm.
     """
 
     cold: float | None = None
     ratio: float | None = None
     warning: str | None = None
+    _seen: float | None = None
 
     def complaint(self, voltage: float, current: float) -> str | None:
         """Why the current must stop, or None; V and A."""
@@ -367,7 +372,10 @@ class WindingThermometer:
                 "the source measures no voltage. Check leads and winding."
             )
         if self.cold is None:
-            self.cold = resistance
+            seen, self._seen = self._seen, resistance
+            if seen is None or abs(resistance / seen - 1) > ALIKE:
+                return None
+            self.cold = seen
         self.ratio = ratio = resistance / self.cold
         told = f"{show(resistance, 'Ohm')}, {ratio:.2f} times its cold resistance"
         if ratio > LOOSE:
