@@ -80,9 +80,9 @@ class Ending:
             return 0
         if self.state is RunState.REFUSED:
             return 2
-        if self.signal is not None:
-            return 128 + self.signal
-        return 130 if self.state is RunState.ABORTED else 3
+        if self.state is not RunState.ABORTED:
+            return 3  # whatever came after the fault
+        return 130 if self.signal is None else 128 + self.signal
 
 
 @dataclass(frozen=True, kw_only=True)

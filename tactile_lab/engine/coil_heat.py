@@ -13,17 +13,18 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending
-from tactile_lab.bench import Bench, CoilLimits
+from tactile_lab.bench import FOUND, Bench, CoilLimits
 from tactile_lab.errors import LimitError
 from tactile_lab.instruments.guard_log import switched_off
 from tactile_lab.instruments.port import kept_of_port, lasting_name
 from tactile_lab.planning.heat import cool_down
+from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.store.folder import lock
 from tactile_lab.whole_file import failing_as, write_text
@@ -106,6 +107,26 @@ class CoilHeat:
             LimitError: the file cannot be written.
         """
         self.keep(self._longest)
+
+    def refuse_found(self, settings: Mapping[str, str]) -> None:
+        """Refuse a coil through which much flowed when its source was opened.
+
+        Args:
+            settings: of its source, as read back when it was opened.
+
+        Raises:
+            LimitError: how warm that made it nobody knows; whoever comes next waits.
+        """
+        found = abs(float(settings.get(FOUND, "0")))
+        if found <= (carries := self._limits.continuous):
+            return
+        self.seen_off()
+        raise LimitError(
+            f"{show(found, 'A')} flowed through the coil when its source was opened, "
+            f"beyond its continuous {show(carries, 'A')}, and nobody knows for how "
+            "long. It is off now; start again, and what heats it waits the "
+            f"{self._longest:.0f} s until it counts as cold."
+        )
 
     def _kept(self) -> tuple[bool, bool, float, float] | None:
         """What the file holds, if there is one.

@@ -25,18 +25,17 @@ from tactile_lab.acquisition.person import Ask
 from tactile_lab.acquisition.program import SETTLED, Program
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
-from tactile_lab.bench import FOUND, Bench, OffReport
+from tactile_lab.bench import Bench, OffReport
 from tactile_lab.drive import Drive
 from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.coil_heat import CoilHeat
 from tactile_lab.engine.provenance import keep_scene, layout, origin, temperature
 from tactile_lab.engine.task import Task
-from tactile_lab.errors import LimitError, SceneError, TactileLabError
+from tactile_lab.errors import SceneError, TactileLabError
 from tactile_lab.planning.calibrated import check_coil
 from tactile_lab.planning.plan import plan
 from tactile_lab.planning.warn import misses_spikes
 from tactile_lab.planning.way import drive_for
-from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scope import Stream
 from tactile_lab.stimulus.force import ForceProtocol
@@ -352,7 +351,8 @@ class Execution(Task[Executed]):
         return DriveCheck(field, calibrated=used is not None and used.unit == "T")
 
     def _doubts(self, settings: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
-        self._refuse_hot(settings.get("coil", {}))
+        if self._heat is not None:
+            self._heat.refuse_found(settings.get("coil", {}))
         scope = settings.get("scope", {})
         found = tuple(one["moved"] for one in settings.values() if "moved" in one)
         if others := scope.get("others"):
@@ -364,24 +364,6 @@ class Execution(Task[Executed]):
         if not self.plan.timeline.asks_force:
             return found
         return found + check_coil(self.scene, settings)
-
-    def _refuse_hot(self, coil: Mapping[str, str]) -> None:
-        """Refuse a coil through which much flowed when its source was opened.
-
-        Raises:
-            LimitError: how warm that made it nobody knows; the next run waits.
-        """
-        if self._heat is None or self.bench.coil is None or FOUND not in coil:
-            return
-        carries = self.bench.coil.limits.continuous
-        if abs(float(coil[FOUND])) > carries:
-            self._heat.seen_off()
-            raise LimitError(
-                f"{show(float(coil[FOUND]), 'A')} flowed through the coil when its "
-                f"source was opened, beyond its continuous {show(carries, 'A')}, and "
-                "nobody knows for how long. It is off now; start again, and the run "
-                f"waits the {self._heat.left():.0f} s until it counts as cold."
-            )
 
     def _drive_for(self, trial: Trial, update_interval: float, before: float) -> Drive:
         return drive_for(trial, self.scene, before, update_interval)

@@ -1,6 +1,7 @@
 """Whole runs on the simulated bench: real drivers, simulated far ends, real files."""
 
 import shutil
+import signal
 from importlib import resources
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 
 from tactile_lab.acquisition import events
+from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.events import RunState
+from tactile_lab.bench import OffReport
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.planning.needs import needs
@@ -464,3 +467,13 @@ def test_settings_are_told_in_units_that_suit_them(run_scene, short):
     assert run.sensor["C1"] == "680 pF"
     assert run.sensor["tau"] == "8.69 s"
     assert run.parameters["levels"] == "200 mN"
+
+
+def test_a_fault_keeps_its_exit_code_whatever_signal_comes_after():
+    """A script took a run that had faulted for one that was stopped."""
+    off = OffReport(True, 0.0, "Output off, 0 A read back.")
+    codes = [
+        Ending(state, off, signal=signal.SIGTERM).exit_code
+        for state in (RunState.FAULTED, RunState.ABORTED, RunState.COMPLETE)
+    ]
+    assert codes == [3, 143, 0]

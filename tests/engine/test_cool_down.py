@@ -442,6 +442,19 @@ def test_a_coil_found_on_beyond_its_continuous_current_cools_first(
     assert heat_of(source).left() > LONGEST - 60.0
 
 
+def test_a_coil_found_hot_is_not_driven_by_hand(source: Source):
+    """A warning was told, and as much could be set at once."""
+    source.bench.write_text(source.bench.read_text().replace('"1 s"', '"600 s"'))
+    set_by_hand(source, b"CURR 0.3\nOUTP 1\n")
+    hand = ManualControl(load("demo", SHORT, str(source.bench)))
+    hand.hold(0.2)
+    done = hand.run()
+    assert done.state is RunState.FAULTED and done.off.verified
+    assert "300 mA flowed through the coil" in done.told
+    assert len(switched_on(source)) == 1, "by hand"
+    assert heat_of(source).left() > LONGEST - 60.0
+
+
 def test_a_coil_found_on_within_its_continuous_current_is_used(
     source: Source, tmp_path: Path
 ):
