@@ -237,7 +237,7 @@ def plan(scene: Scene, *, preview: bool = True) -> Plan:
         uses=uses(scene, needed),
         leaves_out=leaves_out(scene, needed, drive),
         estimate=estimate(scene, needed, drive),
-        assumptions=assumptions(scene, needed),
+        assumptions=assumptions(scene, needed, drive),
         warnings=told,
         preview=result,
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from tactile_lab.analysis.estimate import Estimate, Line
 from tactile_lab.quantity import show
-from tactile_lab.store.applied import BEFORE, VISIBLE, AppliedCurrent, Shunt
+from tactile_lab.store.applied import BEFORE, ENOUGH, VISIBLE, AppliedCurrent, Shunt
 from tactile_lab.store.run import Run
 
 LEVEL = 0.2
@@ -40,6 +40,23 @@ def told(run: Run) -> tuple[str, ...]:
             f"({ratio.low:.4g} to {ratio.high:.4g}) of the source"
         )
     return (said,)
+
+
+def undated(run: Run) -> tuple[str, ...]:
+    """That the shunt hides steps it should show; empty where it shows enough."""
+    applied, least = run.applied, run.visible_step
+    large = int(np.sum(np.abs(np.diff(applied.steps[:, 1])) >= least))
+    if run.shunt is None or played(run) or len(run.overrange("coil_current")):
+        return ()  # which is told elsewhere
+    if large < ENOUGH or applied.edges >= ENOUGH:
+        return ()
+    return (
+        f"The shunt shows {applied.edges} of {large} steps of the coil current that "
+        f"are {show(least, 'A')} or more: hum or noise as large hides the others, and "
+        "it dates nothing. Latencies, and times beside the model, are known as the "
+        "host dates set-points. `tactile-lab run wiring_check` measures hum; shield "
+        "or filter the shunt's lead.",
+    )
 
 
 def played(run: Run) -> bool:

@@ -23,7 +23,7 @@ from tactile_lab.measurement import (
 )
 from tactile_lab.model.temperature import temperature
 from tactile_lab.quantity import count, exact, show
-from tactile_lab.report.driven import played, told
+from tactile_lab.report.driven import played, told, undated
 from tactile_lab.report.mains import told as mains_told
 from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.scene.scene import Scene
@@ -96,6 +96,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
                         *_as_it_fell(run),
                         *overrange_told(run),
                         *mains_told(run),
+                        *undated(run),
                         *warnings,
                         *_doubts(scene, started, settings, warnings),
                         *warned_told(run),
@@ -143,13 +144,14 @@ def _clock(
         start: from which time on the current is meant, s.
         end: up to which, s.
     """
+    sample = float(run.attributes.get("interval", 0.0))  # a spike lies within one
     told = run.applied.uncertainty(start, end)
     if told is not None:
-        return told
+        return math.hypot(told, sample)
     known = run.records("segments")["uncertainty"]
     if not np.isfinite(known).any():
         return None
-    clock = float(np.nanmax(known))
+    clock = math.hypot(float(np.nanmax(known)), sample)
     if scene.bench.coil is not None:  # it acted within one update before it told
         clock = math.hypot(clock, coil_capability(scene.bench.coil).update_interval)
     return clock

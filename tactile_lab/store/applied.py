@@ -24,7 +24,9 @@ Shunt = Callable[[float, float], tuple[FloatArray, FloatArray]]
 SAME = 2e-5
 """Set-points nearer than this are one level, A."""
 VISIBLE = 0.03
-"""Smallest step an edge of which the shunt shows, A: two codes."""
+"""Smallest step an edge of which the shunt shows, A, whatever its codes."""
+VISIBLE_CODES = 1.9
+"""And in codes: 16 mA each in the usual range of a shunt of 0.1 Ohm."""
 ENOUGH = 5
 """So many edges seen tell how early the others came."""
 MANY = 20
@@ -33,7 +35,7 @@ BEFORE, AFTER = 0.06, 0.004
 """An edge is looked for so long before and after the host heard of the step, s, or from
 when it was sent, if that was earlier: an answer may be lost."""
 BIN_TIME = 5e-4
-"""Bins of the shunt that edges are looked for in, s."""
+"""Bins of the shunt that edges are looked for in, s, where samples are as near."""
 BACK = 0.25
 """Part of its step below which the shunt does not fall once an edge has come."""
 MOST_BINS = 1000
@@ -93,6 +95,7 @@ def applied_current(
     coil_lag: float = 0.0,
     listed: ArrayLike = False,
     asked: ArrayLike = np.nan,
+    visible: float = VISIBLE,
 ) -> AppliedCurrent:
     """Join what source and shunt tell.
 
@@ -107,6 +110,7 @@ def applied_current(
             `time` says: `BY_SAMPLES` where the shunt showed when their list began,
             `BY_HOST` where only the host told, else 0.
         asked: when the host sent each, s; not a number where that is not known.
+        visible: smallest step an edge of which the shunt shows, A.
     """
     t, sent, read = (np.asarray(v, np.float64) for v in (time, setpoint, measured))
     if not t.size:
@@ -125,16 +129,21 @@ def applied_current(
     doubt = _doubt(t[first] - np.where(own_clock, np.nan, sent_at))
     if shunt is not None:
         seen = np.full(begin.size, np.nan)
+        width = BIN_TIME
         for i in np.flatnonzero(~own_clock[1:]) + 1:
             since = max(begin[i - 1], np.fmin(begin[i] - BEFORE, sent_at[i]))
-            at = _edge(shunt, since, begin[i], level[i - 1], level[i], coil_lag)
-            seen[i] = np.nan if at is None else at - math.log(2) * coil_lag
+            if abs(level[i] - level[i - 1]) < visible:
+                continue
+            edge = _edge(shunt, since, begin[i], level[i - 1], level[i], coil_lag)
+            if edge is not None:
+                seen[i] = edge[0] - math.log(2) * coil_lag
+                width = max(width, edge[1])
         shown = np.isfinite(seen)
         edges = int(shown.sum())
         if edges >= ENOUGH:
             early, at = begin[shown] - seen[shown], begin[shown]
             lead = float(np.median(early))
-            timing = _timing(at, early, coil_lag)
+            timing = _timing(at, early, coil_lag, width)
             moved = ~own_clock & (np.arange(begin.size) > 0)
             # the small ones came as early as those next to them that the shunt shows:
             # the clocks part in time
@@ -166,7 +175,9 @@ def _doubt(rounds: FloatArray) -> FloatArray:
     return np.where(known, rounds - rounds[known].min(), 0.0) / 2
 
 
-def _timing(heard: FloatArray, early: FloatArray, coil_lag: float) -> float:
+def _timing(
+    heard: FloatArray, early: FloatArray, coil_lag: float, width: float
+) -> float:
     """Half of the 95 % band of a step's time, s: its bin, or less if they agree better.
 
     What scatters between neighbours is how well edges are seen and how steadily the
@@ -178,14 +189,15 @@ def _timing(heard: FloatArray, early: FloatArray, coil_lag: float) -> float:
         heard: when the host heard of each step that was seen, s.
         early: by how much it came before, s.
         coil_lag: L/R, s; 0 where it is not known.
+        width: of a bin, s.
     """
     if heard.size < MANY or coil_lag <= 0:
-        return BIN_TIME
+        return width
     beside = (heard[1:-1] - heard[:-2]) / (heard[2:] - heard[:-2])
     between = (1 - beside) * early[:-2] + beside * early[2:]
     apart = (early[1:-1] - between) ** 2 / (1 + (1 - beside) ** 2 + beside**2)
     scatter = math.sqrt(float(np.mean(apart)))
-    return min(BIN_TIME, math.hypot(Z95 * scatter, BIN_TIME**2 / (8 * coil_lag)))
+    return min(width, math.hypot(Z95 * scatter, width**2 / (8 * coil_lag)))
 
 
 def _of_three(values: FloatArray) -> FloatArray:
@@ -202,14 +214,14 @@ def _level(sent: float, read: FloatArray) -> float:
 
 def _edge(
     shunt: Shunt, since: float, heard: float, old: float, new: float, coil_lag: float
-) -> float | None:
-    """When the current passed half the step to `new` A; None if no shunt shows it.
+) -> tuple[float, float] | None:
+    """When the current passed half the step to `new` A, and the bins it was seen in, s.
+
+    None if no shunt shows it.
 
     Between two bins the shunt is taken to rise along a line, and a bin has the current
     of its middle; that is put right for what bends by L/R, to second order of a bin.
     """
-    if abs(new - old) < VISIBLE:
-        return None
     time, value = shunt(since, heard + AFTER)
     if time.size < 3:
         return None
@@ -225,6 +237,6 @@ def _edge(
     part = (0.5 - done[i - 1]) / (done[i] - done[i - 1])
     width = float(time[i] - time[i - 1])
     if coil_lag < width:  # what then happens within a bin is no bend
-        return float(time[i - 1] + part * width)
+        return float(time[i - 1] + part * width), width
     late = (part * (1 - part) / 2 + 1 / 24) * width**2 / coil_lag
-    return float(time[i - 1] + part * width - late)
+    return float(time[i - 1] + part * width - late), width

@@ -20,6 +20,8 @@ from tactile_lab.store.applied import (
     BIN_TIME,
     BY_SAMPLES,
     MOST_BINS,
+    VISIBLE,
+    VISIBLE_CODES,
     AppliedCurrent,
     Shunt,
     applied_current,
@@ -362,10 +364,18 @@ class StoredRun:
             wanted = round((part.stop - part.start) * signal.interval / BIN_TIME)
             cells = min(max(1, wanted), MOST_BINS)
             found = signal.trace(part.start, part.stop, cells=cells)
-            # the last may be short
-            return found.time[:-1] + found.width / 2, found.mean[:-1]
+            # the last may be short; a sample is of an instant, the first of its bin's
+            middle = (found.width - signal.interval) / 2
+            return found.time[:-1] + middle, found.mean[:-1]
 
         return seen
+
+    @property
+    def visible_step(self) -> float:
+        """Smallest step of the current an edge of which the shunt shows, A."""
+        if "coil_current" not in self.signals:
+            return VISIBLE
+        return max(VISIBLE, VISIBLE_CODES * abs(self.signal("coil_current").gain))
 
     @cached_property
     def applied(self) -> AppliedCurrent:
@@ -384,6 +394,7 @@ class StoredRun:
             self.scene.bench.magnet.coil_lag,
             rows["listed"] if "listed" in columns else False,
             rows["asked"] if "asked" in columns else np.nan,
+            self.visible_step,
         )
 
     @cached_property

@@ -235,7 +235,7 @@ def test_without_v_k_spikes_are_found_as_resets(tmp_path):
     )
     planned = plan(load("spikes_only", bench=str(bench)), preview=False)
     assert planned.needs.detect_on == "V_C2"
-    assert any("resets of V_C2" in line for line in planned.warnings)
+    assert any("resets of V_C2, within one" in line for line in planned.warnings)
 
 
 def test_a_threshold_outside_the_channel_is_refused():
@@ -249,6 +249,28 @@ def test_it_says_how_well_samples_are_dated_where_no_shunt_shows_the_current():
     assert "dated against the force within 45" in seen
     assert "clocks:" not in assumed()
     assert "clocks:" not in assumed('record.signals=["force"]')
+
+
+def test_it_says_where_hum_or_coarse_codes_hide_the_steps_from_the_shunt(tmp_path):
+    """Nothing was said of it: the run then dated its spikes to 45 ms, not to 0.5."""
+    hum = assumed("simulated.hum=20 mV")
+    assert "0 steps of the current reach 400 mA, twice its hum of 20 mV" in hum
+    assert "dated against the force within 45" in hum
+    assert "clocks:" not in assumed("simulated.hum=4 mV")
+    bench = tmp_path / "b.toml"
+    bench.write_text(
+        'simulated = true\n[coil]\n[magnet]\nr = "6 mm"\n'
+        + "".join(
+            f'[[scope.channels]]\nsignal = "{signal}"\ninput = "{input_}"\n'
+            f'range = "{range_}"\n'
+            for signal, input_, range_ in (("V_C1", "A", "5 V"), ("V_K", "B", "5 V"))
+        )
+        + '[[scope.channels]]\nsignal = "coil_current"\ninput = "D"\n'
+        'range = "5 V"\nshunt = "0.1 Ohm"\n'
+    )
+    keys = ['record.signals=["V_C1", "V_K", "coil_current", "spikes"]']
+    told = plan(load(None, keys, bench=str(bench)), preview=False).assumptions
+    assert any("reach 750 mA, which the shunt's channel shows" in line for line in told)
 
 
 def test_assumptions_are_stated():

@@ -3,6 +3,7 @@
 import gc
 import json
 from dataclasses import replace
+from importlib import resources
 from weakref import ref
 
 import numpy as np
@@ -164,3 +165,37 @@ def test_the_window_s_model_is_that_of_slices_of_which_few_are_held(
     gc.collect()
     assert len(kept) > 20
     assert sum(one() is not None for one in kept) <= 2 * SOLVED
+
+
+def test_spikes_of_far_samples_are_no_better_known_than_these(tmp_path):
+    """At 300 S/s they lay 5 ms off, and were said to lie within 0.5 ms."""
+    bench = (resources.files("tactile_lab.scene") / "simulated_bench.toml").read_text()
+    start, end = (
+        bench.index('[[scope.channels]]\nsignal = "V_K"'),
+        bench.index('[[scope.channels]]\nsignal = "coil_current"'),
+    )
+    believed = bench[:start] + bench[end:]
+    for known in ("1 ms", "20 pA"):  # so that clocks alone are left open
+        unit = known.split()[1]
+        believed = believed.replace(
+            f'certainty = "{known}"', f'certainty = "1e-3 {unit}"'
+        )
+    path = tmp_path / "bench.toml"
+    path.write_text(believed)
+    signals = ("coil_current", "V_C1", "V_C2", "spikes")
+    slow = {**SHORT, "record.signals": signals, "record.sample_rate": 300.0}
+    run = Execution(load(None, slow, bench=str(path)), tmp_path).run().folder
+    spikes = find(read(run)).beside.twin.spikes
+    assert spikes.measured.size > 15
+    assert abs(spikes.offsets).max() > 5e-4
+    assert spikes.within >= 0.95
+    assert abs(np.median(spikes.offsets)) < 1.6e-3  # half a sample
+
+
+def test_a_shunt_under_hum_is_told(tmp_path):
+    """Latencies were known to 45 ms, and nothing said why."""
+    humming = {**SHORT, "record.sample_rate": 20e3, "simulated.hum": 0.02}
+    humming["record.signals"] = ("coil_current", "V_C1")
+    run = Execution(load(None, humming), tmp_path).run().folder
+    (told,) = [line for line in read(run).warnings if "hum or noise" in line]
+    assert "steps of the coil current" in told
