@@ -6,23 +6,20 @@ import math
 import re
 from collections.abc import Iterator
 
-import numpy as np
-
 from tactile_lab.analysis.noise import MAINS
 from tactile_lab.instruments.dialects import load_dialect
-from tactile_lab.instruments.registry import coil_capability, scope_capability
+from tactile_lab.instruments.registry import scope_capability
 from tactile_lab.magnetics import A2_PRINTED
+from tactile_lab.planning.clocks import clocks
 from tactile_lab.planning.computing import Computing
 from tactile_lab.planning.estimate import Cost, resolution
 from tactile_lab.planning.needs import Needs
-from tactile_lab.planning.outcome import Step
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.planning.ways import ways_used
 from tactile_lab.quantity import bytes_text, rounded, show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import Simulated
 from tactile_lab.spikes.detection import DEVIATIONS
-from tactile_lab.store.applied import BIN_TIME, ENOUGH, VISIBLE, VISIBLE_CODES
 
 SAMPLES_PER_DECAY = 6
 """Samples per time constant of a spike from which its amplitude can be read."""
@@ -299,7 +296,7 @@ def assumptions(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]
             f"lags: coil {show(magnet.coil_lag, 's')}, core "
             f"{show(magnet.eddy_lag, 's')}, together{known}"
         )
-    lines += _clocks(scene, needed, drive)
+    lines += clocks(scene, needed, drive)
     if not bench.simulated:
         return tuple(lines)
     world = scene.simulated
@@ -335,48 +332,6 @@ def _followers(scene: Scene) -> Iterator[str]:
         f"{show(bias * circuit.R_L, 'V', 2)}; offset "
         f"±{show(followers.offset_uncertainty, 'V')}; {fast}"
     )
-
-
-def _clocks(scene: Scene, needed: Needs, drive: Timeline) -> Iterator[str]:
-    """How well samples are dated against the force where no shunt shows its steps."""
-    source = scene.bench.coil
-    seen = {channel.signal: channel for channel in needed.channels}
-    if source is None or not needed.coil or not seen or not drive.drives:
-        return
-    interval = coil_capability(source).update_interval
-    dated = (
-        f"spikes and voltages are dated against the force within {show(interval, 's')}"
-    )
-    shunt = seen.get("coil_current")
-    finest = max(BIN_TIME, 1 / scene.record.sample_rate)
-    if shunt is None:
-        yield (
-            f"clocks: without coil_current in record.signals, {dated}, an exchange "
-            f"with the source; with it within {show(finest, 's', 2)}, or as well as "
-            "its edges agree"
-        )
-        return
-    hum = scene.simulated.hum if scene.bench.simulated else 0.0
-    least = max(VISIBLE, VISIBLE_CODES * resolution(shunt), 2 * hum * abs(shunt.scale))
-    played = any(
-        s.drive is not None and s.drive.points is not None for s in drive.steps
-    )
-    shown = sum(_steps(step, interval, least) for step in drive.steps)
-    if shown < ENOUGH and not played:
-        beside = f", twice its hum of {show(hum, 'V')}" if hum else ""
-        yield (
-            f"clocks: {shown} steps of the current reach {show(least, 'A', 2)}{beside}"
-            f", which the shunt's channel shows well, and {ENOUGH} are needed: {dated}"
-            ", an exchange with the source, and not by the shunt"
-        )
-
-
-def _steps(step: Step, interval: float, least: float) -> int:
-    """Changes of a trial's current by `least` A or more, one each `interval` s."""
-    if step.current is None:
-        return 0
-    at = np.arange(0.0, step.trial.length + interval, interval)
-    return int(np.sum(np.abs(np.diff(step.current.at(at))) >= least))
 
 
 def _band(half: float | None, unit: str) -> str:

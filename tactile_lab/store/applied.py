@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +39,10 @@ BIN_TIME = 5e-4
 """Bins of the shunt that edges are looked for in, s, where samples are as near."""
 BACK = 0.25
 """Part of its step below which the shunt does not fall once an edge has come."""
+TOO_NOISY = 0.45
+"""Part of its step to which noise may lift or lower the shunt with an edge believed."""
+SETTLED = 5e-3
+"""Time after a step until the shunt shows a level, s."""
 MOST_BINS = 1000
 """Bins read at once: of a longer stretch only the mean is asked for."""
 
@@ -128,7 +133,7 @@ def applied_current(
     sent_at[0] = np.nan  # it stood when the run began, and was read back
     doubt = _doubt(t[first] - np.where(own_clock, np.nan, sent_at))
     if shunt is not None:
-        seen = np.full(begin.size, np.nan)
+        seen, bands = np.full(begin.size, np.nan), np.zeros(begin.size)
         width = BIN_TIME
         for i in np.flatnonzero(~own_clock[1:]) + 1:
             since = max(begin[i - 1], np.fmin(begin[i] - BEFORE, sent_at[i]))
@@ -136,14 +141,15 @@ def applied_current(
                 continue
             edge = _edge(shunt, since, begin[i], level[i - 1], level[i], coil_lag)
             if edge is not None:
-                seen[i] = edge[0] - math.log(2) * coil_lag
-                width = max(width, edge[1])
+                seen[i], bands[i] = edge.time - math.log(2) * coil_lag, edge.band
+                width = max(width, edge.width)
         shown = np.isfinite(seen)
         edges = int(shown.sum())
         if edges >= ENOUGH:
             early, at = begin[shown] - seen[shown], begin[shown]
             lead = float(np.median(early))
-            timing = _timing(at, early, coil_lag, width)
+            noise = math.sqrt(float(np.mean(bands[shown] ** 2)))
+            timing = max(_timing(at, early, coil_lag, width), noise)
             moved = ~own_clock & (np.arange(begin.size) > 0)
             # the small ones came as early as those next to them that the shunt shows:
             # the clocks part in time
@@ -212,12 +218,24 @@ def _level(sent: float, read: FloatArray) -> float:
     return float(known.mean()) if known.size else float(sent)
 
 
+class _Edge(NamedTuple):
+    """A step of the current, as the shunt shows it.
+
+    Attributes:
+        time: when half of it was passed, s.
+        width: of the bins in which it was seen, s.
+        band: half of the 95 % band that noise and hum leave to `time`, s.
+    """
+
+    time: float
+    width: float
+    band: float
+
+
 def _edge(
     shunt: Shunt, since: float, heard: float, old: float, new: float, coil_lag: float
-) -> tuple[float, float] | None:
-    """When the current passed half the step to `new` A, and the bins it was seen in, s.
-
-    None if no shunt shows it.
+) -> _Edge | None:
+    """When the current passed half the step to `new` A; None if no shunt shows it.
 
     Between two bins the shunt is taken to rise along a line, and a bin has the current
     of its middle; that is put right for what bends by L/R, to second order of a bin.
@@ -234,9 +252,31 @@ def _edge(
         return None  # a crest of hum nearly as large as the step
     if time[i] - time[i - 1] > 1.5 * np.median(np.diff(time)):
         return None  # it came in a gap
+    level = value[: i - 1][time[: i - 1] > since + SETTLED]
+    noise = float(level.std()) if level.size > 1 else 0.0
+    band = edge_band(noise, new - old, coil_lag)
+    if band is None:
+        return None
     part = (0.5 - done[i - 1]) / (done[i] - done[i - 1])
     width = float(time[i] - time[i - 1])
     if coil_lag < width:  # what then happens within a bin is no bend
-        return float(time[i - 1] + part * width), width
+        return _Edge(float(time[i - 1] + part * width), width, band)
     late = (part * (1 - part) / 2 + 1 / 24) * width**2 / coil_lag
-    return float(time[i - 1] + part * width - late), width
+    return _Edge(float(time[i - 1] + part * width - late), width, band)
+
+
+def edge_band(noise: float, step: float, coil_lag: float) -> float | None:
+    """Half of the 95 % band, s, of when a step passed half its height under noise.
+
+    What lowers the current of a step that comes by L/R delays that more than as much
+    that raises it hastens it. None where so much may pass for an edge.
+
+    Args:
+        noise: standard deviation of the shunt's bins, A; 0.71 of a hum's amplitude.
+        step: of the current, A.
+        coil_lag: L/R, s.
+    """
+    part = Z95 * noise / abs(step)
+    if part >= TOO_NOISY:
+        return None
+    return max(-coil_lag * math.log1p(-2 * part), part * BIN_TIME)

@@ -83,3 +83,20 @@ def test_a_plan_tells_its_numerical_error_and_what_a_signal_costs():
     assert re.search(r"numerics +spike times within .* by the solver's own", told)
     assert re.search(r'no V_C2 +6 MB of disk and .* without "V_C2" in record', told)
     assert re.search(r"no model beside the run .* record.compare = false", told)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({}, None),
+        ({"simulated.hum": "5 mV"}, "by its noise and hum, and 5 are needed"),
+        ({"simulated.hum": "2 mV"}, "noise and hum of the shunt date"),
+        ({"protocol.levels": ["20 mN"]}, "shows 0 of the source's steps, which are"),
+        ({"coil.way": "list", "simulated.hum": "20 mV"}, None),
+    ],
+)
+def test_a_plan_foresees_where_the_shunt_dates_no_steps(changes, told):
+    """Edges that hum hides, or that are smaller than two codes, left ±45 ms unsaid."""
+    scene = {"protocol.levels": ["120 mN"], "protocol.hold": "0.2 s", **changes}
+    said = [line for line in plan(load("demo", scene)).assumptions if "clocks" in line]
+    assert [told in line for line in said] == ([] if told is None else [True])

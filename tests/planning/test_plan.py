@@ -254,9 +254,9 @@ def test_it_says_how_well_samples_are_dated_where_no_shunt_shows_the_current():
 def test_it_says_where_hum_or_coarse_codes_hide_the_steps_from_the_shunt(tmp_path):
     """Nothing was said of it: the run then dated its spikes to 45 ms, not to 0.5."""
     hum = assumed("simulated.hum=20 mV")
-    assert "0 steps of the current reach 400 mA, twice its hum of 20 mV" in hum
+    assert "it shows those above 620 mA, by its noise and hum" in hum
     assert "dated against the force within 45" in hum
-    assert "clocks:" not in assumed("simulated.hum=4 mV")
+    assert "within 1.3 ms, not 500 µs" in assumed("simulated.hum=4 mV")
     bench = tmp_path / "b.toml"
     bench.write_text(
         'simulated = true\n[coil]\n[magnet]\nr = "6 mm"\n'
@@ -270,7 +270,7 @@ def test_it_says_where_hum_or_coarse_codes_hide_the_steps_from_the_shunt(tmp_pat
     )
     keys = ['record.signals=["V_C1", "V_K", "coil_current", "spikes"]']
     told = plan(load(None, keys, bench=str(bench)), preview=False).assumptions
-    assert any("reach 750 mA, which the shunt's channel shows" in line for line in told)
+    assert any("those above 750 mA, two of its codes, and 5" in line for line in told)
 
 
 def test_assumptions_are_stated():

@@ -79,6 +79,34 @@ def test_a_crest_of_hum_is_no_edge(hum):
     assert np.median(np.abs(early - 7e-3)) < 2e-3 if found.edges else not early.any()
 
 
+@pytest.mark.parametrize("hum", [0.01, 0.02, 0.03])
+def test_hum_of_the_shunt_widens_the_band_of_the_edges_it_moves(hum):
+    """A current that rises by L/R, in 0.5 ms bins, by steps of 120 and 160 mA."""
+    lag, came = 1.1e-3, 0.2 + 0.0453 * np.arange(60)
+    sizes = np.where(np.arange(60) % 4 < 2, 0.12, -0.16) * np.where(
+        np.arange(60) % 3 == 0, 1.0, 0.8
+    )
+    time = np.arange(0, came[-1] + 0.2, 5e-4)
+    since = np.maximum(time[:, None] - came, 0.0)
+    value = (sizes * -np.expm1(-since / lag)).sum(axis=1)
+    value = value + hum * np.sin(2 * np.pi * 50 * time + 1.0)
+
+    def seen(start, end):
+        inside = (time >= start) & (time < end)
+        return time[inside], value[inside]
+
+    found = applied_current(
+        np.append(0.0, came + 7e-3),
+        np.append(0.0, np.cumsum(sizes)),
+        np.full(61, np.nan),
+        seen,
+        coil_lag=lag,
+    )
+    missed = np.abs(found.steps[1:, 0] - came)
+    assert np.quantile(missed, 0.95) < found.uncertainty()
+    assert found.uncertainty() < 2 * lag
+
+
 def test_an_edge_in_a_gap_of_the_shunt_keeps_the_host_s_time():
     found = applied_current(*rows(), shunt(blind=(1.99, 2.02)))
     assert found.edges == 2
