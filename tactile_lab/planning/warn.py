@@ -44,6 +44,7 @@ def warnings(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]:
         *_spike_sampling(scene, needed),
         *_noise(scene, needed, drive.streamed),
         *_scope(scene, needed),
+        *_shunt(needed, drive),
         *_field(scene, needed, drive),
         *(() if scene.bench.simulated else _magnet(scene)),
         *_exchanged(scene, needed),
@@ -203,6 +204,23 @@ def _scope(scene: Scene, needed: Needs) -> Iterator[str]:
         yield (
             "this scope is blind while it hands a record over: there are gaps between "
             "its records, which stay open in all that shows or exports them."
+        )
+
+
+def _shunt(needed: Needs, drive: Timeline) -> Iterator[str]:
+    """Where the coil current leaves its channel, which the model does not have."""
+    channel = next((c for c in needed.channels if c.signal == "coil_current"), None)
+    if channel is None:
+        return
+    levels = [step.current.value for step in drive.steps if step.current is not None]
+    low, high = channel.span
+    least = min((float(one.min()) for one in levels), default=0.0)
+    most = max((float(one.max()) for one in levels), default=0.0)
+    if least < low or most > high:
+        yield (
+            f"the coil current will be {show(least, 'A')} to {show(most, 'A')}, scope "
+            f"input {channel.input} sees {show(low, 'A')} to {show(high, 'A')}: beyond "
+            "that it is cut off, and dates no steps. Choose a larger range."
         )
 
 

@@ -187,6 +187,20 @@ def test_a_range_is_widened_where_the_model_expects_more(fixed_ranges):
     assert ranges("monitor")["V_C1"] == 2.0
 
 
+def test_a_coil_current_beyond_its_channel_is_foreseen():
+    """It was cut off, dated no steps, and seemed another than the source's."""
+    shunt = {"signal": "coil_current", "input": "D", "range": 0.05, "shunt": 0.1}
+    scene = {
+        "bench.scope.channels": [shunt],
+        "record.signals": ["coil_current"],
+        "protocol.levels": ["-120 mN", "60 mN"],
+    }
+    told = " ".join(plan(load("demo", scene), preview=False).warnings)
+    assert "current will be −598.2 mA to 299.1 mA, scope input D sees −500 mA" in told
+    scene["protocol.levels"] = ["-90 mN", "60 mN"]
+    assert "sees" not in " ".join(plan(load("demo", scene), preview=False).warnings)
+
+
 def test_a_short_push_in_a_long_run_is_expected_as_deep_as_it_goes():
     """Of 20 s of scans V_C1 lies below 0.5 V for 5 ms, once."""
     scan = [
