@@ -1,7 +1,8 @@
 """C2 between two spikes, charged by what V_GS + V_P(t) lets through, Eqs. (17), (18).
 
-Node A follows the drive V_GS + V_P within milliseconds, so T1's current is a function
-of the drive alone. Where T1 saturates it is not, and nothing here holds.
+Node A follows the drive V_GS + V_P by its time constant, some 6 ms, so T1's current is
+a function of what the drive was so long before, to second order of that over tau. Where
+T1 saturates it is not, and nothing here holds.
 """
 
 from __future__ import annotations
@@ -64,7 +65,8 @@ class Charging:
         half = (end - begin) / 2
         at = (begin + half)[:, None] + half[:, None] * _NODES
         left = np.exp((at - end[:, None]) / c.tau_L)
-        charge = np.sum(_WEIGHTS * self.current(drive(at)) * left, axis=1) * half
+        current = self.current(drive(at - c.tau_A))
+        charge = np.sum(_WEIGHTS * current * left, axis=1) * half
         kept = c.reset_voltage * np.exp((begin - end) / c.tau_L)
         voltage: FloatArray = charge / c.C2 + kept
         return voltage

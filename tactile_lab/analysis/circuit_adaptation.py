@@ -64,7 +64,7 @@ class CircuitAdaptation:
 
     def rate(self, time: ArrayLike) -> FloatArray:
         """Eq. (15) with V_P(t) at `time`, s on the axis of the spike times, Hz."""
-        t = np.asarray(time, dtype=np.float64) - self.hold[0]
+        t = np.asarray(time, dtype=np.float64) - self.hold[0] - self.circuit.tau_A
         decayed = self.V_P.value * np.exp(-t / self.tau.value)
         return Charging(self.circuit).rate(self.V_GS.value + decayed)
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tactile_lab.analysis.rate_force import eq15_rate, onset
+from tactile_lab.analysis.rate_force import eq15_rate, fit_rate_law, onset
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
@@ -24,6 +24,31 @@ def test_eq_15_is_zero_below_the_quasi_static_critical_force():
 
 def test_a_slow_ramp_leaves_less():
     assert eq15_rate(Circuit(), 0.15, ramp=2.0) < eq15_rate(Circuit(), 0.15)
+
+
+@pytest.mark.parametrize("tau", [1.5, 8.69])
+def test_the_scale_of_the_force_is_that_of_the_model(tau):
+    """Node A late by 6 ms was 0.4 % of force where the film forgets in 1.5 s."""
+    circuit, trains = Circuit(tau=tau, V_GS=1.47), []
+    steps = [Waveform.pulse(force, ramp=0.25, hold=1.0) for force in (0.1, 0.15, 0.2)]
+    for start, force in zip((0, 100, 200), steps, strict=True):
+        spikes = simulate(circuit, force, keep=("spikes",)).spike_times
+        trains.append(start + spikes[(spikes > 0.28) & (spikes < 1.25)])
+    force = {
+        100 * i: simulate(circuit, one, keep=("V_P",), until=2)
+        for i, one in enumerate(steps)
+    }
+
+    def V_P(time):
+        which = 100 * np.floor((time + 50) / 100)
+        return sum(
+            np.where(which == start, run.sample("V_P", np.clip(time - start, 0, 2)), 0)
+            for start, run in force.items()
+        )
+
+    law = fit_rate_law(circuit, V_P, trains)
+    assert law.scale.value == pytest.approx(1, abs=2e-4)
+    assert law.V_GS.value == pytest.approx(1.47, abs=1e-4)
 
 
 def test_the_reset_time_adds_to_each_interval():
