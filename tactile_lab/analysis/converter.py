@@ -13,6 +13,13 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tactile_lab.arrays import FloatArray
+
+POOL, POOLS = 64, 8
+"""Bins whose scatter is taken together, and fewest of such pools that tell more."""
+STILL = 0.05
+"""Variance, of a code squared, of noise too small to smooth steps, not near an edge."""
+
 
 def step_bias(mean: ArrayLike, code: float, samples: float) -> float:
     """How far the mean of a slow signal may be off by its converter's steps.
@@ -35,5 +42,18 @@ def step_bias(mean: ArrayLike, code: float, samples: float) -> float:
     scatter = float(np.median(apart)) / 0.6745
     # noise that smooths little makes the steps' own scatter less or more than this
     noise = 0.8 * (samples * scatter**2 - code**2 / 12)
+    if _still(apart, samples) < STILL * code**2:
+        noise = 0.0  # what was seen elsewhere is toggling at the edge of a code
     left = math.exp(-2 * math.pi**2 * max(noise, 0.0) / code**2)
     return min(code / 2, code / math.pi * left) if noise > 0 else code / 2
+
+
+def _still(apart: FloatArray, samples: float) -> float:
+    """Variance of a sample where the signal is quietest, a tenth of the time.
+
+    Where it does not move at all it may be cut off, and tells nothing.
+    """
+    whole = apart[: apart.size // POOL * POOL].reshape(-1, POOL)
+    pools = samples * np.mean(whole**2, axis=1)
+    pools = pools[pools > 0]
+    return float(np.quantile(pools, 0.1)) if pools.size >= POOLS else math.inf

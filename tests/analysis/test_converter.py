@@ -1,0 +1,26 @@
+"""What a converter's steps leave open, by the scatter of means."""
+
+import numpy as np
+import pytest
+
+from tactile_lab.analysis.converter import step_bias
+
+
+def means(level, noise, samples=500, seed=3):
+    """Means of bins of a converter with steps of 1."""
+    rng = np.random.default_rng(seed)
+    return np.array([np.round(v + rng.normal(0, noise, samples)).mean() for v in level])
+
+
+@pytest.mark.parametrize("rest", [0.5, 0.45, 0.3])
+def test_a_rest_at_the_edge_of_a_code_is_no_large_noise(rest):
+    """Toggling there seemed to smooth the steps, which were off by 0.2 elsewhere."""
+    level = np.concatenate([np.full(1000, rest), np.linspace(0, 2, 500)])
+    seen = means(level, 0.127)
+    assert step_bias(seen, 1.0, 500) > np.quantile(np.abs(seen - level), 0.97)
+
+
+def test_noise_that_smooths_is_seen_at_rest_and_under_way():
+    for rest in (0.0, 0.25, 0.5):
+        level = np.concatenate([np.full(1000, rest), np.linspace(0, 2, 500)])
+        assert step_bias(means(level, 0.6), 1.0, 500) < 0.01
