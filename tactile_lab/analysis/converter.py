@@ -53,7 +53,9 @@ def _still(apart: FloatArray, samples: float) -> float:
 
     Where it does not move at all it may be cut off, and tells nothing.
     """
-    whole = apart[: apart.size // POOL * POOL].reshape(-1, POOL)
-    pools = samples * np.mean(whole**2, axis=1)
-    pools = pools[pools > 0]
-    return float(np.quantile(pools, 0.1)) if pools.size >= POOLS else math.inf
+    pools = apart[: apart.size // POOL * POOL].reshape(-1, POOL)
+    pools = pools[np.any(pools > 0, axis=1)]
+    if len(pools) < POOLS:
+        return math.inf
+    variance = samples * (np.median(pools, axis=1) / 0.6745) ** 2
+    return float(np.quantile(variance, 0.1))
