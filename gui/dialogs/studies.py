@@ -69,6 +69,8 @@ class StudiesCard(Overlay):
         self.points = Combo()
         self.points.setAccessibleName("Point")
         self.points.setMaximumWidth(POINT)
+        # what tells points apart stands first, why one failed last
+        self.points.view().setTextElideMode(Qt.TextElideMode.ElideRight)
         self.point = push("Open the point")
         self.point.clicked.connect(lambda: self._pick(self.points.currentData()))
         inner = QWidget()
@@ -80,7 +82,7 @@ class StudiesCard(Overlay):
         pick = row((self.hint, 1), self.points, self.point, spacing=12)
         foot = row(STRETCH, self.page, self.close_button, spacing=12)
         column(self.card, head, self._area, pick, foot, margin=22, spacing=14)
-        self.choice.currentIndexChanged.connect(self._show)
+        self.choice.currentIndexChanged.connect(self._show_chosen)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._look_again)
 
@@ -119,7 +121,12 @@ class StudiesCard(Overlay):
         at = self.choice.currentIndex()
         return self._folders[at] if 0 <= at < len(self._folders) else None
 
-    def _show(self, *_: object) -> None:
+    def _show_chosen(self, *_: object) -> None:
+        """Show another study, from its beginning."""
+        self._show()
+        self._area.verticalScrollBar().setValue(0)
+
+    def _show(self) -> None:
         folder = self._chosen
         self.choice.setVisible(folder is not None)
         self.state.setVisible(folder is not None)
@@ -154,9 +161,13 @@ class StudiesCard(Overlay):
         self.tables.setText(told)
         self.tables.setVisible(bool(told))
         say(self.hint, HINT if plots else "")
+        chosen = self.points.currentData()
         self.points.clear()
         for number, point in ({} if seen is None else seen.points).items():
             self.points.addItem(str(point), number)
+            last = self.points.count() - 1
+            self.points.setItemData(last, str(point), Qt.ItemDataRole.ToolTipRole)
+        self.points.setCurrentIndex(max(0, self.points.findData(chosen)))
         for one in (self.points, self.point):
             one.setVisible(self.points.count() > 0)
         while len(self.figures) < len(plots):

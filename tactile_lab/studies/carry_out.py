@@ -175,15 +175,14 @@ def _carried_out(
     there = done
     if missing.size:
         live = LiveStudy(study, shelf, named, out / study.name)
-        with workers(study, points, shelf, count, scheduler) as crew:
+        with live, workers(study, points, shelf, count, scheduler) as crew:
             pace = _Pace(crew.count)
             tell(StudyProgress(done, study.design.size, there, failed, crew.count))
             for one in _batches(study, missing, named, points, shelf, crew, pace):
                 pace.tell(one.points)
                 done, failed = done + one.points, failed + one.failed
-                tell(StudyProgress(done, study.design.size, there, failed, crew.count))
                 live.tell(done, failed)
-        live.end()
+                tell(StudyProgress(done, study.design.size, there, failed, crew.count))
     found = gathered(study, shelf, shelf.find(named))
     if missing.size or not is_written(study, out / study.name):
         with failing_as(

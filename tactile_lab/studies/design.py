@@ -158,13 +158,15 @@ class Design:
     @cached_property
     def _draws(self) -> FloatArray:
         """Values of the drawn axes, shape (draws, axes), SI."""
+        if not self.drawn:  # what draws takes 2 s to load
+            return np.empty((1, 0))
         parts = self._parts()
         columns = [
             axis.spread.at(column)
             for axis, column in zip(self.drawn, parts.T, strict=True)
             if axis.spread is not None
         ]
-        return np.column_stack(columns) if columns else np.empty((1, 0))
+        return np.column_stack(columns)
 
     def _parts(self) -> FloatArray:
         """Points in the unit cube, shape (draws, axes)."""

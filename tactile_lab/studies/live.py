@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.conclusion import Table
-from tactile_lab.errors import RunFolderError
+from tactile_lab.errors import RecordingError, RunFolderError
 from tactile_lab.plot import Plot
 from tactile_lab.quantity import count, show
 from tactile_lab.scene.load import load
@@ -28,12 +30,12 @@ from tactile_lab.studies.study import Study
 from tactile_lab.whole_file import failing_as, write_text
 
 LIVE, RESULTS, LOCK = "live.json", "results.json", ".lock"
-"""Files in a study's folder: while it is computed, once it is finished, and the one
-that whoever carries it out holds."""
+"""Files in a study's folder: until its page is written, from then on, and the one that
+whoever carries it out holds."""
 SCENE = "scene.toml"
 """The scene that varies, complete."""
-SHOWN = "shown"
-"""Key of either file under which stands what the window shows."""
+SHOWN, LEFT = "shown", "left"
+"""Keys: in either file what the window shows, in the first the points not known yet."""
 EVERY = 1.0
 """Shortest time from one look to the next, s."""
 SHARE = 20
@@ -41,7 +43,11 @@ SHARE = 20
 
 
 class LiveStudy:
-    """Writes what is known of a study that is computed."""
+    """Writes what is known of a study that is computed, and at the end all of it.
+
+    However it ends: interrupted, the window would tell of fewer points than are kept.
+    The page of a finished study takes its place.
+    """
 
     def __init__(
         self, study: Study, shelf: Shelf, named: NDArray[np.void], folder: Path
@@ -49,7 +55,22 @@ class LiveStudy:
         self._study, self._shelf, self._named = study, shelf, named
         self._file = folder / LIVE
         _write(folder / SCENE, study.scene)
-        self._next = 0.0
+        self._known, self._next = (0, 0), 0.0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if kind is None:
+            self._write()
+        else:  # what ended it is what has to be told
+            with suppress(RecordingError):
+                self._write()
 
     def tell(self, done: int, failed: int) -> None:
         """So many points are done; written now and then.
@@ -57,20 +78,24 @@ class LiveStudy:
         Raises:
             RecordingError: the folder cannot be written.
         """
+        self._known = done, failed
         began = time.monotonic()
-        if began < self._next:
-            return
+        if began >= self._next:
+            self._write()
+            took = time.monotonic() - began
+            self._next = began + max(EVERY, SHARE * took)
+
+    def _write(self) -> None:
+        done, failed = self._known
         places = self._shelf.find(self._named)
         found = gathered(self._study, self._shelf, places)
         said = f"{done:,} of {count(self._named.size, 'point')} are known"
         said += f", {failed:,} of these refused or failed." if failed else "."
-        write_json(self._file, {SHOWN: shown(found, [said], plots(found))})
-        took = time.monotonic() - began
-        self._next = began + max(EVERY, SHARE * took)
-
-    def end(self) -> None:
-        """It is finished: its results take the place of this."""
-        self._file.unlink(missing_ok=True)
+        told = {
+            LEFT: self._named.size - done,
+            SHOWN: shown(found, [said], plots(found)),
+        }
+        write_json(self._file, told)
 
 
 def shown(
@@ -198,9 +223,10 @@ def look_at(folder: Path) -> SeenStudy:
     file = _told_in(folder) or folder / RESULTS
     running = is_running(folder)
     try:
-        told = json.loads(file.read_text(encoding="utf-8"))[SHOWN]
+        whole = json.loads(file.read_text(encoding="utf-8"))
+        told = whole[SHOWN]
         sentences = tuple(map(str, told["sentences"]))
-        if file.name == LIVE and not running:
+        if whole.get(LEFT) and not running:
             sentences += ("Nobody computes it now; start it again and it goes on.",)
         tables = tuple(map(_table, told.get("tables", ())))
         drawn = tuple(Plot.from_dict(plot) for plot in told["plots"])

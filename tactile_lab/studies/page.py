@@ -12,7 +12,7 @@ from tactile_lab.store.folder import write_json
 from tactile_lab.studies.addresses import study_digest
 from tactile_lab.studies.axes import Axis
 from tactile_lab.studies.dataset import KEPT, MADE_OF, Gathered, is_written
-from tactile_lab.studies.live import RESULTS, SHOWN, shown
+from tactile_lab.studies.live import LIVE, RESULTS, SHOWN, shown
 from tactile_lab.studies.study import Study
 from tactile_lab.whole_file import failing_as, write_text
 
@@ -77,6 +77,7 @@ def _written(found: Gathered, folder: Path) -> tuple[Path, Conclusion]:
         **said.plain,
     }
     write_json(folder / RESULTS, results)
+    (folder / LIVE).unlink(missing_ok=True)
     return html, said
 
 

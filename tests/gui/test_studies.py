@@ -116,16 +116,92 @@ def test_one_that_was_killed_says_how_to_go_on(tmp_path: Path) -> None:
     class KilledError(Exception):
         pass
 
+    done = 0
+
     def tell(progress: StudyProgress) -> None:
-        if progress.done > 1:
+        nonlocal done
+        done = progress.done
+        if done > 1:
             raise KilledError
 
     with pytest.raises(KilledError):
         carry_out(load_study(ASKED, "onset"), tmp_path, count=1, tell=tell)
     (folder,) = studies_in(tmp_path)
-    assert "start it again" in look_at(folder).sentences[-1]
+    seen = look_at(folder)
+    assert f"{done} of 18 points are known" in seen.sentences[0]
+    assert "start it again" in seen.sentences[-1]
     with pytest.raises(RunFolderError):
         look_at(tmp_path)
+
+
+def test_the_chosen_study_stays_chosen_as_it_ends(lab, tmp_path: Path) -> None:
+    """Between its last point and its page it was in no list, and another was shown."""
+    out = tmp_path / "studies"
+    for name in ("first", "second"):
+        write_page(carry_out(load_study(ASKED, name), out, count=1), out / name)
+    again = load_study({**ASKED, "keep": ["critical_force", "spike_count"]}, "first")
+    (out / "first" / "results.json").unlink()
+    card = StudiesCard(lab.window, Theme("light"))
+    card.show_studies((out,))
+    heard: list[str] = []
+
+    def tell(_: StudyProgress) -> None:
+        card.refresh()
+        if "first" in [card.choice.itemText(n) for n in range(card.choice.count())]:
+            card.choice.setCurrentText("first")
+            heard.append(card.state.text())
+
+    found = carry_out(again, out, count=1, tell=tell)
+    assert "Running" in heard
+    card.refresh()
+    assert card.choice.currentText() == "first"
+    assert card.text.text().splitlines()[-1] == "18 of 18 points are known."
+    write_page(found, out / "first")
+    card.refresh()
+    assert card.choice.currentText() == "first" and card.page.isEnabled()
+    assert "18 points of demo" in card.text.text()
+    card.hide()
+    card.deleteLater()
+
+
+def test_points_that_failed_alike_can_be_told_apart_in_their_list(
+    lab, tmp_path: Path
+) -> None:
+    """What differs was left out of the middle, in favour of the end of the reason."""
+    keep = {"third": "spikes[np.array([9999])]"}
+    asked = load_study({**ASKED, "keep": keep, "axis": ASKED["axis"][:1]}, "failing")
+    write_page(carry_out(asked, tmp_path, count=1), tmp_path / "failing")
+    card = StudiesCard(lab.window, Theme("light"))
+    card.show_studies((tmp_path,))
+    view, texts = card.points.view(), range(card.points.count())
+    assert "IndexError" in card.points.itemText(0)
+    shown = {
+        view.fontMetrics().elidedText(
+            card.points.itemText(n), view.textElideMode(), card.points.maximumWidth()
+        )
+        for n in texts
+    }
+    assert len(shown) == len(texts) == 9
+    role = Qt.ItemDataRole.ToolTipRole
+    assert card.points.itemData(8, role) == card.points.itemText(8)
+    card.hide()
+    card.deleteLater()
+
+
+def test_another_study_is_shown_from_its_beginning(lab, tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        write_page(
+            carry_out(load_study(ASKED, name), tmp_path, count=1), tmp_path / name
+        )
+    card = StudiesCard(lab.window, Theme("light"))
+    card.show_studies((tmp_path,))
+    bar = card._area.verticalScrollBar()
+    lab.until(lambda: bar.maximum() > 0)
+    bar.setValue(bar.maximum())
+    card.choice.setCurrentIndex(1 - card.choice.currentIndex())
+    assert bar.value() == 0, "what it says stands there"
+    card.hide()
+    card.deleteLater()
 
 
 def test_what_axes_share_is_told_in_the_window_too(lab, tmp_path: Path) -> None:
