@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 WATCH = HOLDS / 2
 """Age of an answer, s, at which it is asked for anew while nothing uses the bench."""
 
-SILENT = "what did not answer"
+SILENT, UNUSABLE = "what did not answer", "what the log says of it"
 
 ROLES = {
     "coil": "Coil source",
@@ -73,6 +74,7 @@ class ConnectedBench(QObject):
         self._looking = self._switching = False
         status.faulted.connect(self._doubt)
         self.choice: str | None = None
+        self._unusable = ""
         self.spec: BenchSpec | None = None
         self.found: Checked | None = None
         self.answers: tuple[InstrumentAnswer, ...] = ()
@@ -87,9 +89,11 @@ class ConnectedBench(QObject):
         try:
             self.spec = load_bench(choice)
         except (TactileLabError, OSError) as error:
+            if self.spec is None:
+                self._unusable, self.see_to = choice, UNUSABLE
             self._status.set_fault("The bench cannot be used.", str(error))
             return
-        self.choice = choice
+        self.choice, self._unusable = choice, ""
         self.overrides, self.found = (), None
         self.request = bench_request(choice, self.spec)
         if not self._status.coil.doubtful:  # else that stands until somebody answered
@@ -144,13 +148,24 @@ class ConnectedBench(QObject):
 
     @property
     def refused(self) -> str:
-        """Name of a real bench that was chosen and is not connected; "" for none."""
+        """Name of a real bench that was chosen and is not connected; "" for none.
+
+        That of its file where nothing else could be read.
+        """
+        if self._unusable:
+            return Path(self._unusable).name
         spec = self.spec if self.found is None else None
         return "" if spec is None or spec.simulated else spec.name
+
+    @property
+    def wanted(self) -> str | None:
+        """The bench that was chosen last, though it may not be usable."""
+        return self._unusable or self.choice
 
     def let_go(self) -> None:
         """No bench any more."""
         self.choice = self.spec = self.found = None
+        self._unusable = ""
         self._status.coil.use(None)
 
     def set_inputs(self, channels: str) -> str:
@@ -255,9 +270,12 @@ class ConnectedBench(QObject):
             status.lose_engine()
             return
         if found is None:
+            self.see_to = SILENT
             if self.found is None:
+                if self.spec is not None and not self.spec.simulated:
+                    self._unusable, self.see_to = self.choice or "", UNUSABLE
                 self.spec = self.choice = None
-            self.found, self.see_to = None, SILENT
+            self.found = None
             status.coil.left(UNKNOWN)  # nobody looked, and somebody may be using it
             status.set_fault("The bench cannot be used.", reply.problem)
             return

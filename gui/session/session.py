@@ -127,9 +127,9 @@ class Session(QObject):
         return ""
 
     def connect_again(self) -> None:
-        """Ask the bench that did not answer."""
-        if self.bench.choice is not None:
-            self.connect_bench(self.bench.choice)
+        """Ask the bench that did not answer, or whose file could not be used."""
+        if self.bench.wanted is not None:
+            self.connect_bench(self.bench.wanted)
 
     def disconnect_bench(self) -> None:
         """Let go of the bench."""

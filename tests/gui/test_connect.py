@@ -335,6 +335,26 @@ def test_a_bench_that_did_not_answer_can_be_connected_again(lab) -> None:
     assert card.simulated.isVisible() and not card.again.isVisible()
 
 
+def test_a_bench_whose_file_was_mended_can_be_connected_again(lab, source) -> None:
+    """One that did not load was forgotten: only the simulated one was offered."""
+    window, session = lab.window, lab.session
+    session.disconnect_bench()
+    whole = source.bench.read_text()
+    file = source.bench.with_name("mistyped.toml")
+    file.write_text(whole.replace("port", "prot"))
+    session.connect_bench(str(file))
+    assert session.state is WindowState.FAULT and not session.bench.choice
+    window.banner.acknowledge.click()
+    card = window.centre.empty
+    assert card.again.isVisible() and "mistyped.toml" in card.text.text()
+    file.write_text(whole)
+    card.again.click()
+    lab.until(lambda: session.state is WindowState.READY)
+    assert session.bench.choice == str(file) and not session.bench.refused
+    session.disconnect_bench()
+    assert card.simulated.isVisible() and not card.again.isVisible()
+
+
 def test_a_source_that_answered_is_not_told_as_silent(lab, source) -> None:
     """Of one whose output was on: "See to what did not answer"."""
     window, session = lab.window, lab.session
