@@ -7,9 +7,10 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QMenu, QWidget
+from PySide6.QtWidgets import QWidget
 
 from gui.header.header import Header
+from gui.popup_menu import Menu
 from gui.review.run_card import day
 from gui.screen.panels import Panels
 from gui.screen.screen import Screen
@@ -21,7 +22,7 @@ RECENT = 8
 Act = Callable[[], object]
 
 
-class GearMenu(QMenu):
+class GearMenu(Menu):
     """What can be asked of the whole window, with the keys that ask the same.
 
     Args:

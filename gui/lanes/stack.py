@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPoint, QPointF, Qt, Signal
-from PySide6.QtWidgets import QFrame, QMenu
+from PySide6.QtWidgets import QFrame
 
 from gui.lanes.arrangement import Arrangement, resized
 from gui.lanes.box import LaneBox
@@ -23,6 +23,7 @@ from gui.lanes.view import TimeView
 from gui.look.theme import Theme
 from gui.parts import column, lines, row
 from gui.plots.numbers import number
+from gui.popup_menu import Menu
 from tactile_lab.trace import Trace
 
 if TYPE_CHECKING:
@@ -265,7 +266,7 @@ class LaneStack(QFrame):
     def _ask(self, box: LaneBox, here: QPointF, at: QPoint) -> None:
         """The menu of a lane, at a place in it."""
         time, value = self.scene.time_at(here.x()), box.value_at(here.y())
-        menu, view, lane = QMenu(self), self.view, box.lane
+        menu, view, lane = Menu(self), self.view, box.lane
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.setAccessibleName(lane.plain)
 

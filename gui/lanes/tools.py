@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from PySide6.QtCore import QPoint, Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QWidget
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from gui.lanes.compare import MARKS
 from gui.lanes.stack import LaneStack
@@ -13,6 +13,7 @@ from gui.lanes.view import TimeView
 from gui.look.theme import Theme
 from gui.parts import IconButton, Segments, bar
 from gui.plots.numbers import decimals
+from gui.popup_menu import Menu
 from tactile_lab.quantity import show
 
 WIDTHS = (1.0, 5.0, 10.0)
@@ -185,7 +186,7 @@ class Tools(QWidget):
         self._stack.arrange()
 
     def _choose_lanes(self) -> None:
-        menu = QMenu(self)
+        menu = Menu(self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         for row in self._stack.rows:
             key = row.lane.key

@@ -10,7 +10,8 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QMenu
+
+from gui.popup_menu import Menu
 
 
 class Box(pg.ViewBox):  # type: ignore[misc]
@@ -59,7 +60,7 @@ class Box(pg.ViewBox):  # type: ignore[misc]
                 self.getViewWidget().picked.emit(number)
         elif event.button() is Qt.MouseButton.RightButton:
             view = self.getViewWidget()
-            menu = QMenu(view)
+            menu = Menu(view)
             menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
             menu.addAction("Show all", self.show_all)
             copy = QGuiApplication.clipboard().setPixmap

@@ -9,7 +9,7 @@ from typing import Any
 
 from PySide6.QtCore import QPoint, Qt, QTimer, Signal
 from PySide6.QtGui import QKeySequence, QShortcut, QShowEvent
-from PySide6.QtWidgets import QMenu, QWidget
+from PySide6.QtWidgets import QWidget
 
 from gui.look.theme import Theme
 from gui.parts import (
@@ -27,6 +27,7 @@ from gui.parts import (
     stack,
     with_gutter,
 )
+from gui.popup_menu import Menu
 from gui.review.run_card import RunCard, differing
 from gui.review.thumbnails import Thumbnails
 from gui.tab_order import reach
@@ -139,9 +140,9 @@ class RunsView(QWidget):
         """Runs ticked for comparison."""
         return [card.entry for card in self.cards if card.tick.isChecked()]
 
-    def menu_of(self, entry: RunSummary) -> QMenu:
+    def menu_of(self, entry: RunSummary) -> Menu:
         """What can be done with a run."""
-        menu = QMenu(self)
+        menu = Menu(self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         star = "Take the star away" if entry.starred else "Give it a star"
         for words, asked, offered in (

@@ -7,10 +7,11 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, Signal
-from PySide6.QtWidgets import QLineEdit, QMenu, QWidgetAction
+from PySide6.QtWidgets import QLineEdit, QWidgetAction
 
 from gui.look.theme import Theme
 from gui.parts import IconButton
+from gui.popup_menu import Menu
 from gui.setup.form import Form
 from gui.setup.parameter import FieldError, text_of
 from gui.setup.presets import parameters, presets, save_preset
@@ -91,9 +92,9 @@ class PresetButton(IconButton):
         self.menu_of_presets().popup(self.mapToGlobal(QPoint(0, self.height())))
         self.name.setFocus()
 
-    def menu_of_presets(self) -> QMenu:
+    def menu_of_presets(self) -> Menu:
         """A menu with the presets, a name for a new one, and to delete."""
-        menu, shown, found = QMenu(self), self.shown(), self._presets()
+        menu, shown, found = Menu(self), self.shown(), self._presets()
         menu.aboutToHide.connect(menu.deleteLater)
         for name, file in found.items():
             action = menu.addAction(name, partial(self.use, file))
@@ -117,7 +118,7 @@ class PresetButton(IconButton):
                 out.addAction(name, partial(self._ask_to_delete, name, file))
         return menu
 
-    def _save_and_close(self, menu: QMenu) -> None:
+    def _save_and_close(self, menu: Menu) -> None:
         menu.close()
         self.save(self.name.text())
 

@@ -12,6 +12,7 @@ from gui.dialogs.preferring import PreferencesCard
 from gui.habits import Habits
 from gui.menu import GearMenu
 from gui.parts import Combo
+from gui.popup_menu import Menu
 from gui.preferences import Preferences
 from gui.state import WindowState
 
@@ -262,3 +263,18 @@ def test_the_clock_goes_on_without_samples(lab) -> None:
     window.setup.start_when_planned()
     lab.until(lambda: session.state is WindowState.RUNNING)
     lab.until(lambda: session.run.elapsed > 2.0)
+
+
+def test_a_line_that_keys_choose_is_in_sight_though_the_menu_scrolls(lab) -> None:
+    """Up chose the last line, Quit, of which nothing was to be seen."""
+    menu = Menu(lab.window)
+    for number in range(200):
+        menu.addAction(f"Line {number}")
+    menu.popup(QPoint(0, 0))
+    lab.until(menu.isVisible)
+    assert not menu.rect().contains(menu.actionGeometry(menu.actions()[-1]))
+    QTest.keyClick(menu, Qt.Key.Key_Up)
+    assert menu.activeAction() is menu.actions()[-1]
+    assert menu.rect().contains(menu.actionGeometry(menu.actions()[-1]))
+    menu.close()
+    menu.deleteLater()
