@@ -8,11 +8,14 @@ from PySide6.QtWidgets import QLabel, QSizePolicy
 
 from gui.state import unmarked
 
+LINES = 3
+"""Of a long message, as of a file of another kind; more would leave lanes no room."""
+
 
 class Notice(QLabel):
     """Wrapped; a word too long for a line, as a path, is shortened in its middle.
 
-    The tool tip then has the whole.
+    So is a message of many lines at its end. The tool tip then has the whole.
     """
 
     def __init__(self) -> None:
@@ -40,7 +43,11 @@ class Notice(QLabel):
     def _shorten(self) -> None:
         metrics, room = self.fontMetrics(), self.contentsRect().width()
         middle = Qt.TextElideMode.ElideMiddle
-        words = self._whole.split(" ")
+        lines = self._whole.split("\n")
+        if len(lines) > LINES:
+            more = len(lines) - LINES + 1
+            lines[LINES - 1 :] = [f"… {more} more lines in the log."]
+        words = "\n".join(lines).split(" ")
         shown = " ".join(metrics.elidedText(word, middle, room) for word in words)
         self.setText(shown)
         self.setToolTip("" if shown == self._whole else self._whole)

@@ -64,3 +64,16 @@ def test_a_current_that_a_warm_coil_is_refused(lab) -> None:
     assert "still warm" in said(lab)
     lab.run()
     assert not said(lab), "it was of what is over"
+
+
+def test_a_message_of_many_lines_leaves_the_lanes_their_room(lab) -> None:
+    """A study opened as a skin said 15 lines: of the lanes nothing could be read."""
+    words = "\n".join(f"mistake {number}" for number in range(15))
+    lab.window.centre.say(words)
+    assert said(lab).splitlines() == [
+        "mistake 0",
+        "mistake 1",
+        "… 13 more lines in the log.",
+    ]
+    assert lab.window.centre.notice.toolTip() == words
+    lab.window.centre.say("")
