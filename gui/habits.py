@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
 
 from gui.lanes.stack import LaneStack
-from gui.preferences import Preferences
+from gui.preferences import Preferences, from_anywhere
 from gui.screen.screen import Screen
 from gui.session.session import Session
 
@@ -49,7 +49,8 @@ class Habits(QObject):
                 QTimer.singleShot(number * APART, QApplication.beep)
 
     def _watch(self) -> None:
-        self._wishes.keep(last_bench=self._session.bench.choice or "")
+        last = self._session.bench.choice
+        self._wishes.keep(last_bench=from_anywhere(last) if last else "")
         if self._wishes.wants("monitor") and not self._session.queue.going:
             self._session.show_monitor(True)
 

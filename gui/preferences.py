@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os.path import expanduser
 from pathlib import Path
 from typing import Any
 
@@ -119,3 +120,8 @@ class Preferences(QObject):
         self._recent = [path, *(one for one in self._recent if one != path)][:MOST]
         if self._settings is not None:
             self._settings.setValue("recent", "\n".join(self._recent))
+
+
+def from_anywhere(bench: str) -> str:
+    """A bench, found from any working folder: the next start may have another."""
+    return bench if bench == "sim" else str(Path(expanduser(bench)).absolute())

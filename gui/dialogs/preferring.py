@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from os.path import expanduser  # that of Path raises where nobody is so called
 from pathlib import Path
 
 from PySide6.QtWidgets import QCheckBox, QLayout, QLineEdit, QWidget
@@ -24,7 +25,7 @@ from gui.parts import (
     stack,
     with_gutter,
 )
-from gui.preferences import Preferences
+from gui.preferences import Preferences, from_anywhere
 from tactile_lab.errors import RunFolderError, TactileLabError
 from tactile_lab.scene.load import load_bench
 
@@ -84,10 +85,12 @@ class PreferencesCard(Overlay):
         self.folder.setFocus()
 
     def _save(self) -> None:
-        folder, bench = self.folder.text().strip(), self.bench.text().strip()
+        folder = expanduser(self.folder.text().strip())
+        bench = self.bench.text().strip()
         try:
             check_folder(Path(folder))
             if bench not in ("", "none"):
+                bench = from_anywhere(bench)
                 load_bench(bench)
         except (TactileLabError, OSError) as error:
             say(self.problem, str(error))

@@ -8,6 +8,7 @@ from PySide6.QtGui import QHelpEvent, QKeySequence, QShortcut
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QToolTip
 
+import tactile_lab
 from gui.dialogs.preferring import PreferencesCard
 from gui.habits import Habits
 from gui.menu import GearMenu
@@ -15,6 +16,8 @@ from gui.parts import Combo
 from gui.popup_menu import Menu
 from gui.preferences import Preferences
 from gui.state import WindowState
+
+SIMULATED = Path(tactile_lab.__file__).parent / "scene" / "simulated_bench.toml"
 
 
 @pytest.fixture
@@ -65,6 +68,31 @@ def test_settings_act_at_once(lab) -> None:
     window.preferences.set(folder=str(out), lsl=False, bench="")
     assert not session.run.publish
     assert session.out == out
+
+
+def test_what_settings_name_is_found_from_any_working_folder(
+    lab, tmp_path: Path, monkeypatch
+) -> None:
+    """Runs went into a folder "~", and the bench was gone at a start from elsewhere."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    bench = tmp_path / "mine.toml"
+    bench.write_text(SIMULATED.read_text())
+    window, session = lab.window, lab.session
+    out = session.out
+    window.actions_.show_preferences()
+    card = window.findChild(PreferencesCard)
+    card.folder.setText("~/data")
+    card.bench.setText("mine.toml")
+    card.save.click()
+    assert session.run.out == tmp_path / "data"
+    assert window.preferences.chosen_bench == str(bench)
+    window.preferences.set(folder=str(out), bench="")
+    session.connect_bench("mine.toml")
+    lab.until(lambda: session.state is WindowState.READY)
+    assert window.preferences.bench == str(bench), "the one that answered last"
+    session.connect_bench("sim")
+    lab.until(lambda: session.state is WindowState.READY)
 
 
 def test_no_report_is_written_for_tests_that_follow(lab) -> None:
