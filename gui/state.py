@@ -330,10 +330,9 @@ def clock_text(snapshot: Snapshot) -> tuple[str, str]:
         return word, "acknowledge to go on"  # it need not be of the last run
     if not snapshot.known:
         return word, "nobody answered lately"
-    if snapshot.elapsed:
-        return word, f"last run {elapsed}"
-    old = truth(snapshot.state, snapshot.coil) is CoilKnowledge.WAS_OFF
-    return word, "no run yet" if old else "coil off"
+    if truth(snapshot.state, snapshot.coil) is CoilKnowledge.WAS_OFF:
+        return word, "STOP reads it back"  # nobody else may ask some sources
+    return word, f"last run {elapsed}" if snapshot.elapsed else "coil off"
 
 
 def minutes(seconds: float, *, tenths: bool = False) -> str:

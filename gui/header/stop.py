@@ -28,6 +28,9 @@ from gui.state import (
 
 WIDTH, HEIGHT = 228, 52
 
+ACTS = "Coil to 0 A, output off, verified by read-back (Esc, F12)"
+OLD = "It was off then, and nobody has read it back since: STOP does."
+
 UNDECIDED = (CoilKnowledge.ASKED, CoilKnowledge.FALLING, CoilKnowledge.WAS_OFF)
 """What it claims in amber: not at rest for sure, nor live for sure."""
 
@@ -41,7 +44,7 @@ class StopButton(QAbstractButton):
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setToolTip("Coil to 0 A, output off, verified by read-back (Esc, F12)")
+        self.setToolTip(ACTS)
         self._truth = CoilKnowledge.NONE
         self._fault = False
         self._words = StopText("STOP", "no coil source")
@@ -71,6 +74,8 @@ class StopButton(QAbstractButton):
             self._truth, self._fault, self._words = shown
             self.setText(self._words.spoken)
             self.setAccessibleName(self._words.spoken)
+            old = self._truth is CoilKnowledge.WAS_OFF
+            self.setToolTip(f"{ACTS}. {OLD}" if old else ACTS)
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:

@@ -265,11 +265,11 @@ class Session(QObject):
             self.monitor.stop("monitor off")
             self._log_stop("Monitor off; the coil was not in use")
         elif self.state is WindowState.READY and self.bench.request is not None:
-            self._log_stop("Coil off sent again")
+            self._log_stop("Sending coil off again")
             self.bench.check()
         elif self.state in (WindowState.FAULT, WindowState.DISCONNECTED):
             if self.status.coil.limits is not None:
-                self._log_stop("Coil off sent again", Severity.WARNING)
+                self._log_stop("Sending coil off again", Severity.WARNING)
                 self.bench.switch_off()
         self.queue.hold()
 

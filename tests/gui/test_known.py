@@ -184,7 +184,8 @@ def test_stop_asks_a_source_that_did_not_answer_again(
     served.stop()
     until(served, lambda: len(served.log.lines) == said + 2)
     asked, told = served.log.lines[said:]
-    assert "Coil off sent" in asked.text and "Not verified off" in told.text
+    assert "Sending coil off" in asked.text, "it cannot be, and is not told as sent"
+    assert "Not verified off" in told.text
     assert served.state is state and coil(served) is CoilKnowledge.UNKNOWN
 
 

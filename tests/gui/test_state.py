@@ -60,8 +60,10 @@ def test_a_verified_off_holds_for_two_minutes() -> None:
         old = replace(off, read_age=300.0)
         assert truth(state, old) is CoilKnowledge.WAS_OFF
         assert stop_text(state, old).spoken == "STOP: 0 mA read back 5 min ago"
-    for coil, said in (off, "coil off"), (old, "no run yet"):
+    for coil, said in (off, "coil off"), (old, "STOP reads it back"):
         assert clock_text(Snapshot(WindowState.READY, coil=coil))[1] == said
+    ran = Snapshot(WindowState.READY, coil=old, elapsed=18.0)
+    assert clock_text(ran)[1] == "STOP reads it back", "what to do, and not only then"
 
 
 def test_without_coil_stop_says_so() -> None:
