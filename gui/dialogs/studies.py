@@ -22,7 +22,7 @@ from tactile_lab.studies.page import REPORT
 AGAIN = 1000
 """Milliseconds after which the files are looked at anew."""
 NONE = (
-    "No studies yet in {}. tactile-lab study STUDY.toml --out there makes one: a scene "
+    "No studies yet in {0}. tactile-lab study STUDY.toml --out {0} makes one: a scene "
     "at many points, see docs/studies.md."
 )
 

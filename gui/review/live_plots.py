@@ -22,10 +22,13 @@ COLUMNS: dict[str, tuple[str, str, Callable[[MeasuredTrial], float | None]]] = {
     "spikes": ("", "", lambda step: None if step.uncounted else step.response.spikes),
     "first spike": ("s", "m", lambda step: step.response.latency),
     "peak rate": ("Hz", "", lambda step: step.response.peak_rate),
-    "final rate": ("Hz", "", lambda step: step.response.final_rate),
-    "fall": ("%", "", lambda step: _percent(step.response.fall)),
+    "final rate": ("Hz", "", lambda s: s.response.final_rate if s.complete else None),
+    "fall": ("%", "", lambda s: _percent(s.response.fall) if s.complete else None),
 }
-"""What a step can be drawn by: unit, its prefix, and the value of a step, SI."""
+"""What a step can be drawn by: unit, its prefix, and the value of a step, SI.
+
+Where STOP cut a step short its last rate is not final.
+"""
 
 
 def column_plot(trials: Sequence[MeasuredTrial], y: str, x: str) -> Plot | None:
@@ -69,6 +72,8 @@ def rate_plot(
 ) -> Plot | None:
     """Peak and final rate of each step against its force; None before one fired.
 
+    Of steps that came to their end: a rate in the midst of a hold is not its final one.
+
     Args:
         trials: the steps so far.
         model: force, N, and peak rate, Hz, of the model's steps.
@@ -76,7 +81,7 @@ def rate_plot(
     steps = [
         (t.level, *t.response.rates)
         for t in trials
-        if t.level is not None and not t.uncounted
+        if t.level is not None and t.complete and not t.uncounted
     ]
     if not any(peak > 0 for _, peak, _ in steps):
         return None

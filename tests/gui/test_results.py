@@ -102,6 +102,17 @@ def test_a_step_of_one_spike_has_no_rate_and_is_not_drawn_as_silent() -> None:
     assert rate_plot([SILENT, once]) is None
 
 
+def test_a_step_that_stop_cut_short_has_no_final_rate() -> None:
+    """The plot had one beside "No step that ended has fired"."""
+    cut = replace(FAST, level=0.2, complete=False)
+    for series in rate_plot([SILENT, SLOW, cut]).panels[0].series:
+        assert series.x == pytest.approx([0.04, 0.08])
+    assert rate_plot([SILENT, cut]) is None
+    for what in ("final rate", "fall"):
+        (series,) = column_plot([SLOW, FAST, cut], what, "force").panels[0].series
+        assert series.name == "2 of 3 steps"
+
+
 def test_a_page_of_results_asks_for_no_more_height_than_it_needs(results) -> None:
     """Plots asked for a picture's, and the room became a gap above the last lines."""
     results.show_statements(["The rate rises."])

@@ -32,6 +32,7 @@ def test_figures_come_with_the_points_and_stay(lab, tmp_path: Path) -> None:
     card = StudiesCard(lab.window, Theme("light"))
     card.show_studies((out,))
     assert "No studies yet" in card.text.text()
+    assert f"--out {out} makes one" in card.text.text()
     seen: list[str] = []
 
     def tell(progress: StudyProgress) -> None:
