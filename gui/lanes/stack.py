@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QPoint, QPointF, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, Qt, Signal
 from PySide6.QtWidgets import QFrame
 
 from gui.lanes.arrangement import Arrangement, resized
@@ -95,7 +95,14 @@ class LaneStack(QFrame):
         made.card.dropped.connect(self.arranged)
         made.card.acted.connect(partial(self._act, made))
         made.card.menu_asked.connect(partial(self._ask_by_key, made))
+        made.card.installEventFilter(self)
         return made
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Have the plots follow their cards, which may be laid out after a frame."""
+        if event.type() in (QEvent.Type.Move, QEvent.Type.Resize):
+            self.scene.refresh()
+        return False
 
     def _stack_cards(self) -> None:
         """Put cards and plots in the order of the rows."""

@@ -25,6 +25,18 @@ from gui.look.tokens import LIGHT
 from gui.parts import IconButton
 
 
+def test_plots_stay_beside_their_cards_where_these_are_laid_out_later(
+    app: QApplication, stack: LaneStack
+) -> None:
+    """After a plan that had failed each lane stood 3 to 14 px below its card."""
+    first = stack.visible_rows()[0].card
+    first.setMinimumHeight(first.height() + 40)
+    settle(app)
+    settle(app)
+    for one in stack.visible_rows():
+        assert one.box.y() == one.card.y() + 5
+
+
 def test_the_threshold_is_dragged_to_where_the_next_run_counts(
     app: QApplication, stack: LaneStack, monkeypatch: pytest.MonkeyPatch
 ) -> None:
