@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Generator, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_origin
@@ -12,7 +13,7 @@ from pydantic.fields import FieldInfo
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import Conclusion
-from tactile_lab.errors import ParameterError, TactileLabError, fault_in
+from tactile_lab.errors import ParameterError, SceneError, TactileLabError, fault_in
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 Probes = Literal["circuit", "ground", "supply"]
 """What the probes of the circuit's voltages touch: their nodes, 0 V, or V_S."""
+
+ROUNDING = 1e-9
+"""Time by which a hold may outlast its trial, s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +67,31 @@ class Trial:
     def onset(self) -> float | None:
         """When what is asked for begins to change, s; None where it never does."""
         return (self.current or self.force).departure(0.0, self.length, near=0.0)
+
+
+def playable(given: object) -> Trial:
+    """What a protocol gave, if it is a trial that comes to an end.
+
+    A run asks as the plan does: what it measured may have gone into the trial.
+
+    Raises:
+        TypeError: it is no trial.
+        SceneError: it has no length, or no end, or its `hold` lies outside it.
+    """
+    if not isinstance(given, Trial):
+        raise TypeError(f"trials gave {type(given).__name__}; yield a Trial")
+    length = given.length
+    if not 0 < length < math.inf:
+        raise SceneError(
+            f'trial "{given.label}" lasts {length} s; it must be longer, and end.'
+        )
+    start, end = given.hold or (0.0, length)
+    if not 0 <= start < end <= length + ROUNDING:
+        raise SceneError(
+            f'trial "{given.label}" lasts {length:g} s, and its hold from {start:g} to '
+            f"{end:g} s: a hold is a part of its trial."
+        )
+    return given
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

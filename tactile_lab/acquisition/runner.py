@@ -40,7 +40,7 @@ from tactile_lab.errors import (
     TactileLabError,
 )
 from tactile_lab.scope import Stream
-from tactile_lab.trial import Outcome, Trial
+from tactile_lab.trial import Outcome, Trial, playable
 from tactile_lab.waveform import Waveform
 
 BASELINE = 0.1
@@ -164,7 +164,7 @@ class Runner:
             while True:
                 trial = next(trials) if outcome is None else trials.send(outcome)
                 index = 0 if outcome is None else outcome.index + 1
-                play = self._pause if trial.pause else self._play
+                play = self._pause if playable(trial).pause else self._play
                 outcome = play(index, trial)
                 self._account.outcome(outcome)
         except StopIteration:

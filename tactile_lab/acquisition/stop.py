@@ -47,7 +47,10 @@ class Lease:
     def __init__(
         self,
         clock: Clock,
-        holder: tuple[str, str] = ("The deciding loop", "a stuck disk or scope"),
+        holder: tuple[str, str] = (
+            "The deciding loop",
+            "a stuck disk or scope, or for what the protocol does between two trials",
+        ),
     ) -> None:
         self._clock = clock
         self._holder = holder

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,7 @@ from tactile_lab.planning.outcome import ModelAlong, ModelOutcome, Step, joined
 from tactile_lab.planning.way import drive_for
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
-from tactile_lab.trial import Outcome, Trial, Trials
+from tactile_lab.trial import Outcome, Trial, Trials, playable
 from tactile_lab.waveform import Waveform
 
 MOST_TRIALS = 10_000
@@ -117,7 +117,7 @@ def timeline(scene: Scene, *, through_coil: bool) -> Timeline:
         raise LimitError(f"{scene.path or scene.name}: {reason}") from reason
     except TactileLabError:
         raise
-    except (Exception, SystemExit) as reason:
+    except (Exception, SystemExit, GeneratorExit) as reason:
         raise SceneError(f"{name} fails: {scene.protocol.fault(reason)}") from reason
     if not driver.steps:
         raise SceneError(f"{name} asks for no trial.")
@@ -125,17 +125,13 @@ def timeline(scene: Scene, *, through_coil: bool) -> Timeline:
 
 
 def _play(trials: Trials, driver: _Driver, name: str) -> None:
-    trial = next(trials, None)
-    while trial is not None:
-        if not isinstance(trial, Trial):
-            raise TypeError(f"trials gave {type(trial).__name__}; yield a Trial")
-        outcome = driver.take(trial)
-        if len(driver.steps) >= MOST_TRIALS:
-            raise SceneError(f"{name} asks for more than {MOST_TRIALS} trials.")
-        try:
+    with suppress(StopIteration):
+        trial = next(trials)
+        while True:
+            outcome = driver.take(playable(trial))
+            if len(driver.steps) >= MOST_TRIALS:
+                raise SceneError(f"{name} asks for more than {MOST_TRIALS} trials.")
             trial = trials.send(outcome)
-        except StopIteration:
-            return
 
 
 class _Driver:
@@ -156,12 +152,7 @@ class _Driver:
         self._loaded: CurrentList | None = None
 
     def take(self, trial: Trial) -> Outcome:
-        length = trial.length
-        if not (np.isfinite(length) and length > 0):
-            raise SceneError(
-                f'trial "{trial.label}" lasts {length} s; it must be longer.'
-            )
-        force, current = trial.force, trial.current
+        length, force, current = trial.length, trial.force, trial.current
         magnet, drive = self.scene.bench.magnet, None
         if self.through_coil:
             drive = self._played(trial)

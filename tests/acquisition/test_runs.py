@@ -278,6 +278,30 @@ def test_a_rest_that_was_cut_off_at_the_range_is_no_number(run_scene, short):
     assert later[0].drift == 0.0  # the first that is known is compared with
 
 
+@pytest.mark.parametrize("length", ["float('nan')", "float('inf')", "-1.0"])
+def test_a_trial_without_an_end_is_refused_on_the_bench_too(
+    run_scene, tmp_path, length
+):
+    file = tmp_path / "endless.py"
+    file.write_text(
+        "from typing import ClassVar\n"
+        "from tactile_lab.trial import Protocol, Trial\n"
+        "from tactile_lab.waveform import Waveform\n"
+        "class Endless(Protocol):\n"
+        "    name: ClassVar[str] = 'endless'\n"
+        "    title: ClassVar[str] = 'Endless'\n"
+        "    def trials(self):\n"
+        "        wave = Waveform.pulse(0.1, ramp=0.1, hold=0.2)\n"
+        "        done = yield Trial(force=wave, label='one')\n"
+        f"        length = {length} if type(done).__name__ == 'Outcome' else 1.0\n"
+        "        yield Trial(force=wave, duration=length, label='two')\n"
+    )
+    ran = run_scene(scene=str(file))
+    assert ran.done.state is RunState.FAULTED
+    assert ran.done.reason.startswith('trial "two" lasts')
+    assert ran.done.off.verified
+
+
 def test_a_scope_unplugged_in_the_middle_faults_the_run_with_the_coil_off(
     run_scene, short
 ):

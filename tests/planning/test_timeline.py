@@ -171,6 +171,20 @@ def test_rest_and_traces_come_from_the_model(protocol, tmp_path):
             '        yield Trial(force=Waveform.constant(float("nan")), label="x")\n',
             "finite",
         ),
+        (
+            "    def trials(self):\n        yield Trial(force=Waveform.constant(0.0), "
+            'duration=1.0, hold=(0.5, 2.0), label="x")\n',
+            "a part of its trial",
+        ),
+        (
+            "    def trials(self):\n        yield Trial(force=Waveform.constant(0.0), "
+            'duration=1.0, label="x")\n        yield None\n',
+            "trials gave NoneType; yield a Trial",
+        ),
+        (
+            "    def trials(self):\n        raise GeneratorExit\n        yield\n",
+            "GeneratorExit",
+        ),
     ],
 )
 def test_a_faulty_protocol_is_refused_in_words(protocol, body, told, monkeypatch):
