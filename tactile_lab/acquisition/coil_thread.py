@@ -13,12 +13,13 @@ import numpy as np
 from tactile_lab.acquisition.ending import CoilState
 from tactile_lab.acquisition.generator_player import GeneratorPlayer
 from tactile_lab.acquisition.instrument_thread import InstrumentThread, drained
-from tactile_lab.acquisition.stop import Lease, StopRequest
+from tactile_lab.acquisition.stop import LEASE, Lease, StopRequest
 from tactile_lab.bench import AnalogueCoil, Coil, ListCoil, OffReport
 from tactile_lab.clock import Clock
 from tactile_lab.current_list import CurrentList
 from tactile_lab.drive import Drive
-from tactile_lab.errors import HaltedError, InstrumentError
+from tactile_lab.errors import HaltedError, InstrumentError, InterlockError
+from tactile_lab.quantity import show
 from tactile_lab.waveform import Waveform
 
 READ_BACK_EVERY = 0.25
@@ -288,7 +289,25 @@ class CoilThread(InstrumentThread):
             self._asked = now
             self._update(self._waveform, now)
             self._asked = None
-        self.clock.wait_for(self._called, self._wake())
+        wake = self._wake()
+        self.clock.wait_for(self._called, wake)
+        self._woke(self.clock.now() - wake)
+
+    def _woke(self, late: float) -> None:
+        """Look at how late, s, this thread woke: nobody moved the coil meanwhile.
+
+        Raises:
+            InterlockError: for longer than a lease lasts. Who holds one stood still,
+                too, and may renew it before it is looked at.
+        """
+        if late <= LEASE or not self.live or self._is_halted():
+            return
+        kept = 0.0 if self.last is None else self.last.setpoint
+        raise InterlockError(
+            f"This program stood still for {late:.1f} s, and the coil kept "
+            f"{show(kept, 'A')} meanwhile (limit {LEASE:g} s); it was switched off. "
+            "Keep the computer from sleeping, and other work away from it."
+        )
 
     def _called(self) -> bool:
         due = self._waveform is not None and self.clock.now() >= self._next

@@ -1,6 +1,7 @@
 """The coil's thread beside the real driver on a simulated wire, on simulated time."""
 
 import re
+import threading
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -55,6 +56,32 @@ def played(thread, clock, ramp: Waveform) -> tuple[float, list]:
     clock.wait_for(lambda: False, begin + 0.4)
     assert thread.skipped == skipped
     return begin, [a for a in thread.take_applied() if a.asked >= begin]
+
+
+def test_a_program_that_stood_still_in_a_hold_ends_with_the_coil_off(monkeypatch):
+    """A suspended one went on with the next press: the lease was renewed first."""
+    thread = coil_thread()
+    clock, due = thread.clock, []
+    wait_for = clock.wait_for
+
+    def stands_still(condition, until):
+        if due and threading.current_thread() is not test:
+            clock.sleep_until(clock.now() + due.pop())
+        return wait_for(condition, until)
+
+    test = threading.current_thread()
+    monkeypatch.setattr(clock, "wait_for", stands_still)
+    with clock.taking_part("test"):
+        thread.start()
+        thread.energise()
+        clock.wait_for(lambda: thread.live, clock.now() + LONGEST)
+        thread.play(RAMP.shifted(clock.now()), clock.now() + 60.0)
+        clock.wait_for(lambda: False, clock.now() + 0.5)
+        due.append(4.0)
+        clock.wait_for(lambda: thread.ended, clock.now() + 2 * LONGEST)
+    assert "stood still for 4" in str(thread.failure)
+    assert "400 mA" in str(thread.failure)
+    assert thread.off is not None and thread.off.verified
 
 
 def test_the_source_was_read_back_at_0_A_before_the_first_ramp(playing) -> None:
