@@ -210,7 +210,7 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
 
     def _take_over(self) -> None:
         """Go on from what an earlier run, or a person, left it holding."""
-        held, other = self._wire.setpoint(), self._wire.not_taken()
+        held, other = self._wire.standing(), self._wire.not_taken()
         if abs(held) > self.limits.largest:
             other.append(f"it holds {show(held, 'V')}")
         if other:
@@ -270,7 +270,7 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
     def _known_setpoint(self) -> float:
         """The set-point, V; asked where the last answer was lost."""
         if self._setpoint is None:
-            self._setpoint = self.dialect.fixed(self._wire.setpoint())
+            self._setpoint = self.dialect.fixed(self._wire.standing())
         return self._setpoint
 
     def _compare(self, wanted: float, voltage: float, current: float) -> None:

@@ -228,7 +228,7 @@ class CoilSource(SerialInstrument[CoilWire]):
         now = self._clock.now()
         self._trip_on(self._interlock.before_setting(now))
         if self._setpoint is None:  # the last answer was lost on the way
-            self._setpoint = self._wire.setpoint()
+            self._setpoint = self._wire.standing()
         passed = min(now - self._commanded, max(2 * self._interval, CATCH_UP))
         step = self._limits.slew * passed + 0.5 * self.dialect.grain
         within = min(max(current, self._setpoint - step), self._setpoint + step)

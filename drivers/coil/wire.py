@@ -156,8 +156,9 @@ class CoilWire(SourceWire[CoilDialect]):
     def _taken_over(self) -> float:
         """Set-point to ramp down from, A, once a list that may be playing ended."""
         if self.dialect.list is None:
-            return self.setpoint()
-        flowing = self.current()
+            return self.standing()
+        # a wrong digit is set next; of two looks at what moves the smaller harms least
+        flowing = min(self.current(), self.current(), key=abs)
         self.set_current(flowing)
         for line in self.dialect.stop_lines:
             self.command(line)

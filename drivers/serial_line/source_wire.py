@@ -18,6 +18,9 @@ RECONNECT = 1.0
 VERIFICATIONS = 3
 """Times the state to leave it in is commanded and read back before giving up."""
 
+MOST_LOOKS = 4
+"""Times a set-point is asked for until two answers in a row agree."""
+
 REHEARSED = 0.01
 """Set-point, A or V, that shows whether a row is right while the output is off."""
 
@@ -61,6 +64,24 @@ class SourceWire(Conversation[S]):
     def setpoint(self) -> float:
         """Set-point read back, A or V."""
         return self.number(self.dialect.set_query) * self.dialect.set_unit
+
+    def standing(self) -> float:
+        """Set-point that the next step starts from, A or V: two answers agree on it.
+
+        Raises:
+            BadReplyError: no two in a row do.
+        """
+        seen = [self.setpoint()]
+        while len(seen) < MOST_LOOKS:
+            seen.append(self.setpoint())
+            if seen[-1] == seen[-2]:  # a wrong digit would be set next
+                return seen[-1]
+        link = self.link
+        raise BadReplyError(
+            f"The {link.what} at {link.port} answers {self.dialect.set_query!r} with "
+            f"another set-point each time: {', '.join(f'{one:g}' for one in seen)}. "
+            "Check its cable, and that nobody turns its knobs."
+        )
 
     def compliance(self) -> float:
         """Compliance read back, V or A."""

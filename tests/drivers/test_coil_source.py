@@ -119,6 +119,30 @@ def test_a_step_whose_answer_was_lost_is_where_the_next_begins(serial_bench):
     assert all(abs(b - a) <= most for a, b in itertools.pairwise(values))
 
 
+@pytest.mark.parametrize("leaves", [False, True])
+def test_a_lost_answer_and_a_wrong_digit_do_not_set_what_nobody_asked_for(
+    serial_bench, leaves
+):
+    """1.6 A were set on the way from 0.5 A to 0.6 A, and as much on the way out."""
+    it = serial_bench
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.end.faults.add(SerialFault(kind="missing", line="CURR 0", times=2))
+    with pytest.raises(InstrumentError):
+        it.drive(0.6)
+    heard, wrong = it.source.line, [b"1.60000"]
+    it.source.line = lambda line: (
+        wrong.pop() if wrong and line in (b"CURR?", b"MEAS:CURR?") else heard(line)
+    )
+    if leaves:
+        assert it.coil.safe_off().verified
+    else:
+        it.drive(0.6)
+    assert not wrong
+    assert max(change.value for change in it.sets) <= 0.601
+
+
 @pytest.mark.parametrize("current", [2.1, -2.1, math.nan, math.inf])
 def test_refuses_what_may_never_be_set(bench, current):
     *_, far, coil = bench

@@ -219,3 +219,18 @@ def test_a_source_without_lists(serial_bench):
     with pytest.raises(LimitError, match="no list mode"):
         play(coil, SINE, 0.01)
     coil.close()
+
+
+@pytest.mark.parametrize("wrong", ["2.87500", "0.02875"])
+def test_one_wrong_digit_as_a_list_is_ended_is_no_set_point(bench, wrong):
+    """Ten times what flowed was set, beyond the limit of the coil."""
+    play(bench.coil, SINE, 0.05)
+    bench.clock.sleep_until(bench.clock.now() + 1.25)
+    before, largest = len(bench.sets), abs(bench.plant.coil_current(0))
+    once, heard = [wrong.encode()], bench.source.line
+    bench.source.line = lambda line: (
+        once.pop() if once and line == b"MEAS:CURR?" else heard(line)
+    )
+    assert bench.coil.safe_off().verified and not once
+    assert max(abs(one.value) for one in bench.sets[before:]) < largest + 0.02
+    assert bench.source.setpoint == 0.0

@@ -268,6 +268,25 @@ def test_a_voltage_set_by_hand_is_no_short(wired):
             wired.wait(0.2)
 
 
+def test_one_wrong_digit_is_no_voltage_to_go_on_from(wired):
+    """A gate at 1.4 V was ramped from 1.9 V on, as the next run took it over."""
+    wired.source.open()
+    wired.go(1.4)
+    wired.source.close()
+    heard, wrong = wired.panel.line, [b"+1.900000E+00"]
+    wired.panel.line = lambda line: (
+        wrong.pop() if wrong and line == b":SOUR:VOLT?" else heard(line)
+    )
+    before, next_run = len(wired.panel.changes), wired.again()
+    next_run.open()
+    while not next_run.step_to(1.5):
+        wired.wait(STEP_EVERY)
+    sets = [volts for what, _, volts in wired.panel.changes[before:] if what == "set"]
+    assert not wrong and 1.4 < min(sets) and max(sets) < 1.51
+    assert next_run.go_to_rest().verified
+    next_run.close()
+
+
 def test_a_current_source_of_the_same_name_is_no_voltage(wired):
     """Settings that are lost twice are found by their read-back."""
     fault = SerialFault(kind="deaf", line="SOUR:FUNC VOLT", times=2)
