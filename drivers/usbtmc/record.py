@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,6 +17,9 @@ SHIFT = 8
 """Low bits of every code that are 0: bytes are put in the high half."""
 
 _MOST_CODE = 127
+_MOST_BYTE = 255
+_LARGEST = 1e30
+"""What is larger stands for something else: SCPI writes NaN as 9.91E37."""
 
 
 class RecordReader:
@@ -62,15 +66,18 @@ class RecordReader:
         answer = self._link.ask(question).split(",")
         if len(answer) != 10:
             raise BadReplyError(f"{question} gave {len(answer)} numbers, not 10.")
-        interval, origin, step, reference = (
-            number(answer[k], question) for k in (4, 5, 7, 9)
+        interval, origin, step, moved = (
+            number(answer[k], question) for k in (4, 5, 7, 8)
         )
+        reference = number(answer[9], question, 0, _MOST_BYTE)
         wanted = channel.range / (row.divisions_high * row.codes_per_division)
-        for what, got, set_to, unit in (
-            ("V a code", step, wanted, "V"),
-            ("time between samples", interval, stream.interval, "s"),
+        apart = stream.interval
+        for what, got, set_to, within, unit in (
+            ("V a code", step, wanted, 0.01 * wanted, "V"),
+            ("offset", moved * step, channel.offset, wanted, "V"),
+            ("time between samples", interval, apart, 0.01 * apart, "s"),
         ):
-            if abs(got - set_to) > 0.01 * set_to:
+            if abs(got - set_to) > within:
                 raise BadReplyError(
                     f"{channel.signal} came with {what} {got:g} {unit} instead of "
                     f"{set_to:g} {unit}: it was changed on the scope. Leave its knobs "
@@ -85,13 +92,22 @@ def tell(link: UsbtmcLink, lines: Sequence[str], **values: object) -> None:
         link.write(line.format(**values))
 
 
-def number(text: str, question: str) -> float:
+def number(
+    text: str, question: str, least: float = -_LARGEST, most: float = _LARGEST
+) -> float:
     """The number in an answer.
 
     Raises:
-        BadReplyError: it is none.
+        BadReplyError: it is none, or not within `least` and `most`.
     """
     try:
-        return float(text)
-    except ValueError as error:
-        raise BadReplyError(f"{question} gave {text!r}, not a number.") from error
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not least <= value <= most:
+        raise BadReplyError(
+            f"{question} gave {text!r}, not a number from {least:g} to {most:g}. "
+            "Switch the scope off and on; if it says so again, compare its dialect row "
+            "with its manual."
+        )
+    return value

@@ -25,6 +25,8 @@ from tactile_lab.scope import Block, Channel, ScopeCapability, Stream
 
 POLL = 0.02
 """Time between two polls, s."""
+LEAST_RATE = 1e-3
+"""Slowest sample rate that is one, S/s: 0 is none."""
 _MOST_ERRORS = 20
 _SETTLING, _PATIENCE = 0.2, 3.0
 
@@ -134,7 +136,7 @@ class UsbtmcScope(Opened):
             timebase=f"{row.timebase(interval, len(channels)):g}",
         )  # fmt: skip
         self._check("setting up")
-        rate = number(self._link.ask(say.rate), say.rate)
+        rate = number(self._link.ask(say.rate), say.rate, LEAST_RATE)
         before = self._clock.now()
         self._arm()
         after = self._clock.now()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from voltages import Voltages
 
 from drivers.usbtmc.scope import UsbtmcScope
+from sim_backend.serial_line.scpi import ScpiParser
 from sim_backend.usbtmc.bus import SimulatedBus
 from sim_backend.usbtmc.device import SimulatedDevice
 from sim_backend.usbtmc.faults import UsbFault
@@ -173,6 +175,50 @@ def test_a_knob_turned_meanwhile_is_noticed() -> None:
             for _ in range(100):
                 lab.clock.sleep_until(lab.clock.now() + 0.02)
                 lab.scope.poll()
+
+
+def test_a_trace_moved_by_hand_is_noticed() -> None:
+    """Its volts were all wrong by as much, and nobody was told."""
+    lab = Lab()
+    with lab.clock.taking_part("scope"):
+        lab.scope.open()
+        lab.scope.start(TRIO, 1e-6)
+        lab.rigol.channels["1"].offset = 0.2
+        with pytest.raises(BadReplyError, match=r"V_C1 .* offset 0\.2 V .* knobs"):
+            for _ in range(100):
+                lab.clock.sleep_until(lab.clock.now() + 0.02)
+                lab.scope.poll()
+
+
+@pytest.mark.parametrize(
+    ("question", "place", "answer"),
+    [
+        ("ACQuire:SRATe?", 0, "nan"),
+        ("ACQuire:SRATe?", 0, "0"),
+        ("ACQuire:SRATe?", 0, "-1.25E6"),
+        ("ACQuire:SRATe?", 0, "9.9E37"),
+        ("WAVeform:PREamble?", 4, "NAN"),
+        ("WAVeform:PREamble?", 5, "9.91E37"),
+        ("WAVeform:PREamble?", 7, "nan"),
+        ("WAVeform:PREamble?", 8, "nan"),
+        ("WAVeform:PREamble?", 9, "inf"),
+        ("WAVeform:PREamble?", 9, "300"),
+    ],
+)
+def test_what_is_no_number_is_told(question: str, place: int, answer: str) -> None:
+    """SCPI's 9.91E37 was a time, NaN agreed with every setting."""
+    lab = Lab()
+    table = lab.rigol._commands()
+    told = table[question]
+
+    def spoilt(argument: str) -> str:
+        parts = (told(argument) or "").split(",")
+        parts[place] = answer
+        return ",".join(parts)
+
+    lab.rigol.parser = ScpiParser({**table, question: spoilt})
+    with pytest.raises(BadReplyError, match=re.escape(repr(answer))):
+        lab.records(1)
 
 
 def test_a_scope_that_never_triggers() -> None:
