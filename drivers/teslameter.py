@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 from drivers.serial_line.meter import SerialMeter
 from tactile_lab.bench import Reading
 from tactile_lab.errors import BadReplyError, LimitError
 from tactile_lab.instruments.meter_dialect import MULTIPLIERS, TeslameterDialect
+from tactile_lab.quantity import show
 
 MOST_READINGS = 4
 """Readings to take until two in a row have one multiplier."""
+
+UNIT = re.compile(r"[\d.]\s*([A-Za-z]+)\s*$")
+"""What stands behind the number of an answer."""
+
+UNITS = {"t": 1.0, "mt": 1e-3, "ut": 1e-6, "g": 1e-4, "kg": 0.1, "mg": 1e-7}
+"""Tesla of each unit that a meter may write there, in lower case."""
 
 
 class Teslameter(SerialMeter[TeslameterDialect]):
@@ -24,7 +32,7 @@ class Teslameter(SerialMeter[TeslameterDialect]):
 
         Raises:
             LimitError: the field exceeds the meter's range.
-            BadReplyError: the answer is no number, twice.
+            BadReplyError: the answer is no number, twice, or in another unit.
         """
         for _ in range(MOST_READINGS):
             value, factor = self._value(), self._factor()
@@ -42,6 +50,7 @@ class Teslameter(SerialMeter[TeslameterDialect]):
 
         Raises:
             LimitError: the field exceeds its range.
+            BadReplyError: no number, twice, or it shows another unit than the row's.
         """
         answer = self._wire.query(self.dialect.field)
         if re.search(self.dialect.overload, answer):
@@ -49,8 +58,24 @@ class Teslameter(SerialMeter[TeslameterDialect]):
                 f"The field exceeds the teslameter's range (it answers {answer!r}). "
                 "Choose a larger range or autorange."
             )
+        self._refuse_other_unit(answer)
         value = self._wire.parsed(answer)
         return self._wire.number(self.dialect.field) if value is None else value
+
+    def _refuse_other_unit(self, answer: str) -> None:
+        """Where a unit stands behind the number, it must be the row's.
+
+        Raises:
+            BadReplyError: it is another.
+        """
+        shown = UNIT.search(answer)
+        tesla = None if shown is None else UNITS.get(shown[1].lower())
+        if tesla is not None and not math.isclose(tesla, self.dialect.scale):
+            raise BadReplyError(
+                f"The teslameter answers {answer!r} where its dialect "
+                f'"{self.dialect.id}" has units of {show(self.dialect.scale, "T")}. '
+                "Set that unit at its front panel, or correct init or scale of its row."
+            )
 
     def _factor(self) -> float:
         """Factor by the prefix letter of the row's multiplier query, or 1.

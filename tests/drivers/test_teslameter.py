@@ -66,6 +66,37 @@ def test_overload_is_told(meter):
         it.read()
 
 
+@pytest.mark.parametrize(
+    ("answer", "scale", "tesla"),
+    [
+        ("2.75E-03T", 1.0, 2.75e-3),
+        ("0.00275 TESLA", 1.0, 2.75e-3),
+        ("2.75 mT", 1e-3, 2.75e-3),
+        ("27.5G", 1e-4, 2.75e-3),
+        ("27.5", 1e-4, 2.75e-3),
+        ("27.5G", 1.0, None),
+        ("2.75 mT", 1.0, None),
+        ("0.00275T", 1e-4, None),
+    ],
+)
+def test_a_unit_behind_the_number_must_be_the_rows(resistor, answer, scale, tesla):
+    """A meter that had not heard its init gave gauss, and 27.5 T were kept."""
+    row = load_dialect("lakeshore-f41").model_copy(update={"scale": scale})
+    clock = SimulatedClock()
+    sim = SimTeslameter(resistor, row.id, clock)
+    meter = Teslameter(row, plug_in(sim, row.serial, clock, "unit").url, clock)
+    heard = sim.line
+    sim.line = lambda line: answer.encode() if b"FETCH:DC" in line else heard(line)
+    with clock.taking_part("test"):
+        meter.open()
+        if tesla is None:
+            with pytest.raises(BadReplyError, match=f"{answer}.* units of"):
+                meter.read()
+        else:
+            assert meter.read().value == pytest.approx(tesla)
+        meter.close()
+
+
 @pytest.mark.parametrize("kind", ["missing", "partial", "garbled", "noise", "late"])
 def test_one_bad_exchange_is_repeated(meter, kind):
     _, plant, end, it = meter
