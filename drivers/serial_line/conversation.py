@@ -350,5 +350,8 @@ class Conversation(Generic[D]):
         match = re.search(pattern or self.dialect.number, answer)
         if match is None:
             return None
-        value = float(match.group(1))
+        try:
+            value = float(match.group(1))
+        except (TypeError, ValueError):  # a row's own pattern may let 1..5 pass
+            return None
         return value if math.isfinite(value) and abs(value) < 1e30 else None

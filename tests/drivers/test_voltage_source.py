@@ -287,6 +287,19 @@ def test_one_wrong_digit_is_no_voltage_to_go_on_from(wired):
     next_run.close()
 
 
+@pytest.mark.parametrize("answer", ["+1.4..00E+00,+1.0E-09", "+9.91E37,+9.91E37", "."])
+def test_one_answer_that_is_no_number_is_asked_for_again(wired, answer):
+    """A doubled dot ended the run: could not convert string to float."""
+    wired.source.open()
+    wired.go(1.4)
+    heard, wrong = wired.panel.line, [answer.encode()]
+    wired.panel.line = lambda line: (
+        wrong.pop() if wrong and line == b":READ?" else heard(line)
+    )
+    assert wired.source.read().voltage == pytest.approx(1.4, abs=1e-3)
+    assert not wrong
+
+
 def test_a_current_source_of_the_same_name_is_no_voltage(wired):
     """Settings that are lost twice are found by their read-back."""
     fault = SerialFault(kind="deaf", line="SOUR:FUNC VOLT", times=2)
