@@ -48,7 +48,7 @@ def fault_in(file: str | Path, error: BaseException) -> str:
     import traceback
     from pathlib import Path
 
-    told = f"{type(error).__name__}: {error}"
+    told = f"{type(error).__name__}: {error}".removesuffix(": ")
     told = told if len(told) <= LONGEST else f"{told[:LONGEST]} ..."
     frames = traceback.extract_tb(error.__traceback__)
     line = next((f.lineno for f in reversed(frames) if f.filename == str(file)), None)

@@ -83,7 +83,8 @@ def playable(given: object) -> Trial:
     length = given.length
     if not 0 < length < math.inf:
         raise SceneError(
-            f'trial "{given.label}" lasts {length} s; it must be longer, and end.'
+            f'trial "{given.label}" lasts {length:g} s; it must be longer than 0 s, '
+            "and end."
         )
     start, end = given.hold or (0.0, length)
     if not 0 <= start < end <= length + ROUNDING:

@@ -352,6 +352,42 @@ def test_a_protocol_that_fails_in_the_middle_leaves_the_coil_off(run_scene, tmp_
     assert "in trials" in (ran.folder / "traceback.txt").read_text()
 
 
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("yield 'a pulse'", "TypeError: trials gave str; yield a Trial"),
+        ("yield None", "TypeError: trials gave NoneType; yield a Trial"),
+        (
+            "yield Trial(force=wave, label='two', duration=-1.0)",
+            'trial "two" lasts -1 s; it must be longer than 0 s, and end.',
+        ),
+        ("raise MemoryError", "asked.py, line 11: MemoryError"),
+    ],
+)
+def test_what_a_protocol_asks_for_only_in_a_run_is_judged_as_in_its_plan(
+    run_scene, tmp_path, line, told
+):
+    """A trial of -1 s was complete, None had "no attribute 'pause'"."""
+    file = tmp_path / "asked.py"
+    file.write_text(
+        "from typing import ClassVar\n"
+        "from tactile_lab.trial import Protocol, Trial\n"
+        "from tactile_lab.waveform import Waveform\n"
+        "class Asked(Protocol):\n"
+        "    name: ClassVar[str] = 'asked'\n"
+        "    title: ClassVar[str] = 'Asked'\n"
+        "    def trials(self):\n"
+        "        wave = Waveform.pulse(0.1, ramp=0.1, hold=0.2)\n"
+        "        done = yield Trial(force=wave, label='one')\n"
+        "        if type(done).__name__ == 'Outcome':\n"
+        f"            {line}\n"
+    )
+    ran = run_scene(scene=str(file))
+    assert ran.done.state is RunState.FAULTED
+    assert ran.done.off.verified
+    assert ran.done.reason == told
+
+
 def test_a_full_disk_ends_the_run_with_the_coil_off_and_the_data_kept(
     run_scene, short, monkeypatch
 ):
