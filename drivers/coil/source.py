@@ -69,7 +69,7 @@ class CoilSource(SerialInstrument[CoilWire]):
             guard = Guard(port, dialect, setup)
         self._guard = guard
         super().__init__(CoilWire(link, dialect))
-        self._interval = dialect.promised_interval(baud)
+        self._promised = self._interval = dialect.promised_interval(baud)
         self._found: float | None = None
         """What flowed when it was opened, A; None where its output was off."""
         self._setpoint: float | None = None
@@ -94,7 +94,7 @@ class CoilSource(SerialInstrument[CoilWire]):
 
     @property
     def update_interval(self) -> float:
-        """Time one verified set-point takes, s, with margin; measured by `open`."""
+        """Time one verified set-point takes, s, with margin; measured while open."""
         return self._interval
 
     @property
@@ -423,6 +423,7 @@ class CoilSource(SerialInstrument[CoilWire]):
             else:
                 self._warn(report.text)
             wire.link.close()
+        self._interval = self._promised  # whoever opens it next counts on that
         wire.link.end_record()
         if self._guard is not None:
             self._guard.stop()

@@ -68,6 +68,20 @@ def test_update_interval_is_wire_time_and_latency_with_margin(bench):
     assert 1 / coil.update_interval > 20
 
 
+def test_a_closed_source_promises_what_its_row_does(resistor):
+    """Opened before to be switched off, a fast one skipped 1691 set-points of 1 s."""
+    clock = SimulatedClock()
+    wire = KEPCO.serial.model_copy(update={"baud": 4_000_000, "latency": 1e-4})
+    end = plug_in(SimCoilSource(resistor, KEPCO.id, clock), wire, clock, "fast")
+    coil = CoilSource(KEPCO, end.url, CoilLimits(), clock, baud=wire.baud)
+    promised = coil.update_interval
+    with clock.taking_part("test"):
+        coil.open()
+        assert coil.update_interval < 0.1 * promised
+        coil.close()
+    assert coil.update_interval == promised
+
+
 def test_never_on_before_limit_and_zero(bench):
     _clock, _plant, far, coil = bench
     coil.open()
