@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+from tactile_lab.commands.terminal import warn
 
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Ending
@@ -21,6 +25,16 @@ INTERRUPTED = 130
 """Exit code of a program that was asked to end, by Ctrl-C or another program."""
 
 STARTING = b"stopping before anything is opened; once more ends it at once\n"
+
+OVERDUE = 5.0
+"""Time after its coil was left by which a task has ended, usually, s."""
+
+STUCK = (
+    "The coil is left: {off} Its task has not ended in the {seconds:g} s since: a "
+    "protocol, disk or scope does not come back, and is waited for. To end it at once, "
+    "kill process {process} (kill -9); what was recorded is kept, and `tactile-lab "
+    "recover` closes it."
+)
 
 E = TypeVar("E", bound="Ending")
 
@@ -115,6 +129,8 @@ def run_attended(
     The first signal asks for a safe end, a second for one without ramp; no number of
     them ends the program before the coil's state has been verified or given up. Where
     `meanwhile` fails, because its terminal was closed, the task is ended as well.
+    Where it does not end though the coil was left long ago, as a protocol may block,
+    that is told, and how to end it.
 
     Args:
         task: about to run.
@@ -150,11 +166,17 @@ def run_attended(
 
     signals.opened = True
     mind()
+    due = math.inf
     worker = threading.Thread(target=work, name="runner")
     worker.start()
     while worker.is_alive():
         worker.join(0.05)
         mind()
+        if (off := task.coil_state.off) is None:
+            due = time.monotonic() + OVERDUE
+        elif time.monotonic() > due:
+            warn(STUCK.format(off=off.text, seconds=OVERDUE, process=os.getpid()))
+            due = math.inf
         try:
             meanwhile()
         except Exception as failure:
