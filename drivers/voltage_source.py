@@ -96,11 +96,11 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
         wire = self._wire
         try:
             wire.connect()
-            if wire.output_is_on():
+            if wire.output_is_surely_off():
+                wire.set_up(f"{self.name} might be no voltage, or another one")
+            else:
                 self._take_over()
                 self._on = True  # what is refused stays as it was
-            else:
-                wire.set_up(f"{self.name} might be no voltage, or another one")
             self._choose_range()
             if not self._on:
                 self._set(0.0)
@@ -189,7 +189,7 @@ class SourceMeter(SerialInstrument[SourceWire[VoltageDialect]]):
             if not self._wire.reconnected(trouble, RECONNECT):
                 break
             try:
-                if not self._wire.output_is_on():
+                if self._wire.output_is_surely_off():
                     self._on = False
                     told = f"The output of {self.name} was off already."
                     return RestReport(not self.limits.rest, told)

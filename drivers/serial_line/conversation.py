@@ -102,12 +102,12 @@ class Conversation(Generic[D]):
                 self.link.open()
                 if left < TRIES - 1:
                     self.link.resynchronise()  # an earlier answer may come late
+                self.recognise()
                 break
             except (NoReplyError, BadReplyError):
                 self.link.close()
                 if not left:
                     raise
-        self.recognise()
 
     def set_up(self, danger: str) -> None:
         """Send the row's settings and read back that they were taken.

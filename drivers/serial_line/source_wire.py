@@ -61,6 +61,14 @@ class SourceWire(Conversation[S]):
             "off."
         )
 
+    def output_is_surely_off(self) -> bool:
+        """Whether the output is off, which two answers say: one may have a wrong digit.
+
+        Raises:
+            BadReplyError: an answer says neither on nor off, twice.
+        """
+        return not (self.output_is_on() or self.output_is_on())
+
     def setpoint(self) -> float:
         """Set-point read back, A or V."""
         return self.number(self.dialect.set_query) * self.dialect.set_unit

@@ -334,6 +334,18 @@ def test_output_on_at_connect_is_ramped_down(bench):
     assert len(steps(far)) > 4
 
 
+def test_a_character_lost_from_its_name_is_no_other_instrument(serial_bench):
+    """The first line of a run's talk ended it, with exit code 4."""
+    it = serial_bench
+    heard, wrong = it.source.line, [b"EPCO,BIT 4886 20-05,E123456,3.05-1.83"]
+    it.source.line = lambda line: (
+        wrong.pop() if wrong and line == b"*IDN?" else heard(line)
+    )
+    it.coil.open()
+    assert not wrong
+    assert it.coil.identity == "KEPCO,BIT 4886 20-05,E123456,3.05-1.83"
+
+
 def test_wrong_baud_is_no_reply(serial_bench):
     wrong = CoilSource(
         KEPCO, serial_bench.end.url, CoilLimits(), serial_bench.clock, baud=9600

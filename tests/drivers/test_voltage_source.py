@@ -268,6 +268,31 @@ def test_a_voltage_set_by_hand_is_no_short(wired):
             wired.wait(0.2)
 
 
+@pytest.mark.parametrize("leaves", [False, True])
+def test_one_wrong_digit_is_no_output_that_is_off(wired, leaves):
+    """A gate at 1.4 V fell to 0 V as it was taken over, or was left, called off."""
+    wired.source.open()
+    wired.go(1.4)
+    source = wired.source
+    if not leaves:
+        wired.source.close()
+        source = wired.again()
+    heard, wrong = wired.panel.line, [b"0"]
+    wired.panel.line = lambda line: (
+        wrong.pop() if wrong and line == b":OUTP?" else heard(line)
+    )
+    before = len(wired.panel.changes)
+    if leaves:
+        assert source.go_to_rest().text.endswith("V, output off.")
+        assert not wired.panel.output_on
+    else:
+        source.open()
+        assert not [one for one in wired.panel.changes[before:] if one[0] == "set"]
+        assert source.go_to_rest().verified
+        source.close()
+    assert not wrong
+
+
 def test_one_wrong_digit_is_no_voltage_to_go_on_from(wired):
     """A gate at 1.4 V was ramped from 1.9 V on, as the next run took it over."""
     wired.source.open()
