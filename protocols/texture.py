@@ -20,7 +20,7 @@ from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import Duration, Force, Pause, Unit, plus_minus, show
 from tactile_lab.stimulus.force import ForceProtocol
-from tactile_lab.stimulus.indentation import on_indentation, turned_over
+from tactile_lab.stimulus.indentation import balanced, on_indentation, turned_over
 from tactile_lab.trial import Trial, Trials
 
 Length = Annotated[float, Unit("m", above=0.0)]
@@ -128,9 +128,10 @@ class Texture(ForceProtocol):
         told: dict[bool, list[str]] = {True: [], False: []}
         for speed, scans in self._scans(run).items():
             expected = speed / self._length
-            spikes = sum(self._spikes(t).size for _, t in scans)
+            pairs = balanced((begin > 0, (begin, trial)) for begin, trial in scans)
+            spikes = sum(self._spikes(t).size for _, t in pairs)
             try:
-                found = self.frequency(run, scans, expected)
+                found = self.frequency(run, pairs, expected)
             except NotIdentifiableError as why:
                 missing.append(f"No period at {show(speed, 'm/s')}: {why}.")
                 continue
@@ -224,6 +225,11 @@ class Texture(ForceProtocol):
         Raises:
             NotIdentifiableError: too few spikes, or none that chance does not give.
         """
+        if not scans:
+            raise NotIdentifiableError(
+                "the sensor's own rhythm cancels out in scans of both beginnings "
+                "alone, and there are of one"
+            )
         low, high = (part * expected for part in SEARCHED)
         passed = expected * self._length
         spikes = [
@@ -253,7 +259,7 @@ class Texture(ForceProtocol):
         for trial in run.results:
             if trial.label in known and trial.hold is not None and trial.complete:
                 scans = found.setdefault(known[trial.label], [])
-                scans.append((self._begins(len(scans)), trial))
+                scans.append((self._begins(len(scans) % self.passes), trial))
         return found
 
     def _spikes(self, trial: MeasuredTrial) -> FloatArray:

@@ -19,7 +19,7 @@ from tactile_lab.analysis.spike_train import within
 from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion, Table
 from tactile_lab.errors import NotIdentifiableError
-from tactile_lab.measurement import Measurement
+from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Guide, Panel, Plot, Series
 from tactile_lab.quantity import Duration, Force, Pause, Unit, printed, show
 from tactile_lab.stimulus.force import ForceProtocol
@@ -29,7 +29,7 @@ from tactile_lab.stimulus.frequencies import (
     check_rising,
     spaced,
 )
-from tactile_lab.stimulus.indentation import on_indentation, turned_over
+from tactile_lab.stimulus.indentation import balanced, on_indentation, turned_over
 from tactile_lab.trial import Trial, Trials
 
 PushForce = Annotated[float, Unit("N", above=0.0)]
@@ -95,6 +95,9 @@ class Vibration(ForceProtocol):
                 force, hold = forces[turned_over(number)]
                 yield Trial(force=force, label=labels[frequency], hold=hold)
 
+    def _locking(self, run: Measurement) -> tuple[dict[float, PhaseLocking], list[str]]:
+        return locking(run, self._by_label, self.presentations_each)
+
     @property
     def _by_label(self) -> dict[str, float]:
         return by_label(self.frequencies(), 4)
@@ -107,7 +110,7 @@ class Vibration(ForceProtocol):
         """Vector strength and phase at each frequency."""
         if not run.searched:
             return Conclusion(missing=(NOT_SEARCHED,))
-        found, missing = locking(run, self._by_label)
+        found, missing = self._locking(run)
         if not found:
             return Conclusion(missing=tuple(missing))
         locked = [f for f, one in found.items() if one.locked]
@@ -140,7 +143,7 @@ class Vibration(ForceProtocol):
 
     def plots(self, run: Measurement) -> Iterator[Plot]:
         """Vector strength and phase against frequency."""
-        found, _ = locking(run, self._by_label)
+        found, _ = self._locking(run)
         if len(found) < 2:
             return
         at = tuple(found)
@@ -194,31 +197,38 @@ class Vibration(ForceProtocol):
 
 
 def locking(
-    run: Measurement, labels: Mapping[str, float]
+    run: Measurement, labels: Mapping[str, float], presentations_each: int
 ) -> tuple[dict[float, PhaseLocking], list[str]]:
     """Phase locking at each frequency, found by its label; and what is missing."""
-    phases: dict[float, list[FloatArray]] = {}
+    by_frequency: dict[float, list[tuple[bool, MeasuredTrial]]] = {}
     for trial in run.results:
         frequency = labels.get(trial.label)
-        if trial.held is None or trial.hold is None or not trial.complete:
-            continue
-        if frequency is None:
-            continue
-        try:
-            spikes = within(trial.spike_times, trial.hold) + trial.start
-            turns = phases_of(spikes, run.force.at, frequency, trial.held)
-        except NotIdentifiableError:
-            continue
-        phases.setdefault(frequency, []).append(turns)
+        if frequency is not None:
+            trials = by_frequency.setdefault(frequency, [])
+            trials.append((turned_over(len(trials) % presentations_each), trial))
     found, missing = {}, []
-    for frequency, each in phases.items():
+    for frequency, each in by_frequency.items():
+        whole = [(turned, one) for turned, one in each if one.complete and one.held]
         try:
-            found[frequency] = phase_locking(each)
+            phases = [_phases(run, frequency, one) for one in balanced(whole)]
+            if whole and not phases:
+                raise NotIdentifiableError(
+                    "the sensor's own rhythm cancels out in presentations of both "
+                    "halves of the sine alone, and there are of one"
+                )
+            if phases:
+                found[frequency] = phase_locking(phases)
         except NotIdentifiableError as why:
             missing.append(f"No vector strength at {frequency:.4g} Hz: {why}.")
-    if not phases:
+    if not found and not missing:
         missing.append("No vector strength: no vibration was completed.")
     return found, missing
+
+
+def _phases(run: Measurement, frequency: float, trial: MeasuredTrial) -> FloatArray:
+    """Phases of a presentation's spikes against the force's own cycle, rad."""
+    spikes = within(trial.spike_times, trial.hold) + trial.start
+    return phases_of(spikes, run.force.at, frequency, trial.held or (0.0, 0.0))
 
 
 def _phase_half(run: Measurement, frequency: float, one: PhaseLocking) -> float:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
 from tactile_lab.quantity import show
 from tactile_lab.waveform import Waveform
+
+T = TypeVar("T")
 
 FINEST = 2.5e-4
 """Shortest time between two points of a smooth force, s."""
@@ -88,3 +91,19 @@ def turned_over(number: int) -> bool:
     Half of them are turned over, by pairs: what the film remembers changes meanwhile.
     """
     return (number + 1) // 2 % 2 == 1
+
+
+def balanced(each: Iterable[tuple[bool, T]]) -> list[T]:
+    """As many that were turned over as others: the first of each.
+
+    One more of either, of an odd number or of a run cut short, would leave a part of
+    the sensor's own rhythm in what is to cancel it.
+
+    Args:
+        each: whether it was turned over, and what it gave.
+    """
+    both: dict[bool, list[T]] = {False: [], True: []}
+    for turned, one in each:
+        both[turned].append(one)
+    pairs = min(len(both[False]), len(both[True]))
+    return both[False][:pairs] + both[True][:pairs]

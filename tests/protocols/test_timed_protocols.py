@@ -101,6 +101,35 @@ def test_the_sensor_s_own_rhythm_is_not_taken_for_a_vibration_s(base):
         assert one["vector_strength"]["low_95"] == pytest.approx(0.0, abs=0.02)
 
 
+@pytest.mark.parametrize("presentations", [3, 5])
+def test_an_odd_number_of_presentations_leaves_no_rhythm_of_the_sensor_s_own(
+    presentations,
+):
+    """One of 1 µN was told as locked to at 11 Hz, p = 0.006 and 0.001."""
+    odd = Vibration(
+        base=0.18,
+        amplitude=1e-6,
+        lasts=0.8,
+        count=24,
+        highest=60.0,
+        presentations_each=presentations,
+    )
+    run = answered(odd)
+    assert "not locked to the vibration at any frequency" in odd.conclude(run).text
+    # a run cut short after the first of each pair has nothing to tell
+    alone = replace(run, trials=run.trials[:1])
+    assert "both halves of the sine alone" in odd.conclude(alone).missing[0]
+
+
+def test_a_vibration_that_the_coil_did_not_give_is_told_as_that():
+    """All were completed, and it was said that none was."""
+    protocol = Vibration(count=1, lowest=20.0, highest=20.0)
+    run = answered(protocol)
+    still = replace(run, force=Waveform.constant(0.15))
+    (missing,) = protocol.conclude(still).missing
+    assert "the force has nothing of 20 Hz" in missing
+
+
 @pytest.mark.parametrize("period", [0.9e-3, 1e-3])
 def test_the_sensor_s_own_rhythm_is_not_taken_for_a_texture_s(period):
     protocol = Texture(depth=1e-6, period=period, speeds=(0.01, 0.012))
