@@ -10,6 +10,7 @@ from tactile_lab.bench import CoilLimits
 from tactile_lab.instruments.registry import coil_capability
 from tactile_lab.planning.heat import cool_down, heat_along
 from tactile_lab.planning.needs import Needs
+from tactile_lab.planning.outcome import Step
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scope import Channel
@@ -18,6 +19,14 @@ from tactile_lab.waveform import Waveform
 BYTES_PER_SAMPLE = 2
 COMPRESSION = 6.0
 """How much smaller 8-bit codes with a code of noise become (measured: 6.1 to 6.7)."""
+REPORT = 0.5e6, 3.5e6
+"""Bytes that tables, figures and report take in a short run, least and most (measured:
+0.6 MB of one trial without spikes, 3.4 MB of `bipolar`)."""
+PYRAMID = 6 / 512
+"""Bytes of extremes and sums for each stored sample."""
+REWRITTEN = 0.5
+"""Time whose samples are written again, s, where streaming stops and goes on: chunks of
+0.25 s that were not full (measured: 140 kB a channel at 1 MS/s)."""
 CODES = 127
 """Steps of an 8-bit converter from 0 to full scale."""
 
@@ -32,7 +41,8 @@ class Cost:
         trials: how many.
         samples_per_channel: taken of each enabled channel.
         samples_stored: of all stored channels together.
-        disk_raw, disk: bytes before and after compression.
+        disk_raw, disk: bytes of samples before and after compression.
+        disk_beside: bytes that the rest takes, least and most.
         peak_force, peak_current: largest magnitudes, N and A.
         heat, heat_budget: largest leaky I^2 t and what is allowed, A^2 s.
         cool_down: time after the run until the coil counts as cold, s.
@@ -49,6 +59,7 @@ class Cost:
     samples_stored: int
     disk_raw: int
     disk: int
+    disk_beside: tuple[int, int]
     peak_force: float
     peak_current: float
     heat: float
@@ -68,23 +79,28 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
     if needed.coil and coil is not None:
         interval = coil_capability(coil).update_interval
     limits = CoilLimits() if coil is None else coil.limits
-    left, most, _ = heat_along(current, limits)
+    left, heat, _ = heat_along(current, limits)
     samples = round(drive.streamed * scene.record.sample_rate)
     if not needed.channels:
         samples = 0
     raw = samples * len(needed.stored) * BYTES_PER_SAMPLE
+    stored = samples * len(needed.stored)
+    breaks = sum(_stops_stream(step) for step in drive.steps) if stored else 0
+    again = REWRITTEN * scene.record.sample_rate * len(needed.stored) * BYTES_PER_SAMPLE
+    most = REPORT[1] + PYRAMID * stored + breaks * again / COMPRESSION
     step = 0.0 if interval is None else largest_step(current, interval)
     return Cost(
         duration=drive.duration,
         streamed=drive.streamed,
         trials=len(drive.steps),
         samples_per_channel=samples,
-        samples_stored=samples * len(needed.stored),
+        samples_stored=stored,
         disk_raw=raw,
         disk=round(raw / COMPRESSION),
+        disk_beside=(round(REPORT[0] + PYRAMID * stored), round(most)),
         peak_force=drive.force.peak,
         peak_current=current.peak,
-        heat=most,
+        heat=heat,
         heat_budget=limits.heat,
         cool_down=cool_down(left, limits),
         update_interval=interval,
@@ -92,6 +108,11 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
         step_force=step * abs(scene.bench.magnet.newtons_per_ampere),
         resolution={c.signal: resolution(c) for c in needed.channels},
     )
+
+
+def _stops_stream(step: Step) -> bool:
+    """Whether nothing is streamed in a step, or before it while a list is loaded."""
+    return step.trial.pause or (step.drive is not None and step.drive.load > 0)
 
 
 def resolution(channel: Channel) -> float:

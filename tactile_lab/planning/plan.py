@@ -32,9 +32,6 @@ BY_WAY = {
 }
 """What the plan calls trials played so."""
 
-BESIDES = "tables, figures and report take 1 to 3 MB besides"
-"""Measured: 1.2 MB of `v_c1_only`, 2.2 MB of the demo with its spikes and model."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Plan:
@@ -300,10 +297,12 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
         f"{cost.samples_per_channel:,} on {count(channels, 'channel')} at "
         f"{show(plan.scene.record.sample_rate, 'S/s')}; {cost.samples_stored:,} stored",
     )
+    least, most = (bytes_text(float(f"{n:.2g}")) for n in cost.disk_beside)
     yield (
         "disk",
         f"{bytes_text(cost.disk)} of samples compressed, "
-        f"{bytes_text(cost.disk_raw)} raw; {BESIDES}",
+        f"{bytes_text(cost.disk_raw)} raw; tables, figures and report "
+        f"take {least} to {most} besides",
     )
     parts = ", ".join(
         f"{part} {_rounded(seconds)}" for part, seconds in plan.computing.time.items()

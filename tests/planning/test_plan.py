@@ -43,6 +43,18 @@ def test_the_demo_needs_four_channels_and_no_teslameter():
     assert cost.resolution["V_C1"] == pytest.approx(15.7e-3, abs=0.1e-3)
 
 
+def test_what_a_run_takes_beside_its_samples_grows_with_them():
+    """It was told as 1 to 3 MB of any run; a few vibrations took 6.4 MB."""
+    least, most = plan(load(), preview=False).estimate.disk_beside
+    assert least < 3.2e6 < most < 5e6  # measured
+    keys = ["protocol.presentations_each=3", "protocol.count=2"]
+    least, most = plan(load("vibration", keys), preview=False).estimate.disk_beside
+    assert least < 6.35e6 < most < 10e6  # measured
+    keys = ["protocol.duration=3600 s", 'record.signals=["V_C1"]']
+    least, most = plan(load("monitor", keys), preview=False).estimate.disk_beside
+    assert least > 1.8e9 * 6 / 512  # at 500 kS/s
+
+
 def test_spikes_only_streams_v_k_and_stores_no_samples():
     planned = plan(load("spikes_only"))
     assert [c.signal for c in planned.needs.channels] == ["V_K"]
