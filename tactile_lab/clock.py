@@ -18,6 +18,14 @@ from weakref import WeakSet
 
 Predicate = Callable[[], bool]
 
+WITH_SLEEP: int | None = getattr(time, "CLOCK_BOOTTIME", None)
+"""Linux's clock that goes on while the computer sleeps: `time.monotonic` stops."""
+
+
+def steady() -> float:
+    """Time by a clock that nobody sets, s; where the system has it, sleep included."""
+    return time.monotonic() if WITH_SLEEP is None else time.clock_gettime(WITH_SLEEP)
+
 
 class Clock(Protocol):
     """What every thread that acts in time may ask of time."""
@@ -58,17 +66,20 @@ class Clock(Protocol):
 
 
 class RealClock:
-    """Monotonic time of this computer."""
+    """Time of this computer that nobody sets; what it slept through has passed.
+
+    So a run notices that its current stood meanwhile, and ends.
+    """
 
     simulated = False
 
     def __init__(self) -> None:
-        self._origin = time.monotonic()
+        self._origin = steady()
         self._changed = threading.Condition()
 
     def now(self) -> float:
         """Seconds since the clock was made."""
-        return time.monotonic() - self._origin
+        return steady() - self._origin
 
     def sleep_until(self, when: float) -> None:
         """Return at `when` s."""

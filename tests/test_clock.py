@@ -69,6 +69,19 @@ def test_time_waits_for_a_thread_that_is_slow_to_begin():
     assert begun == [0.0]
 
 
+@pytest.mark.skipif(
+    not hasattr(time, "CLOCK_BOOTTIME"), reason="Linux tells of the computer's sleep"
+)
+def test_what_the_computer_sleeps_through_has_passed(monkeypatch) -> None:
+    """A run went on as if nothing had been, its current held all the while."""
+    clock, told = RealClock(), time.clock_gettime
+    slept = {time.CLOCK_BOOTTIME: 3600.0}
+    monkeypatch.setattr(
+        time, "clock_gettime", lambda which: told(which) + slept.get(which, 0.0)
+    )
+    assert 3600.0 <= clock.now() < 7200.0
+
+
 def test_simulated_hour_takes_no_hour():
     clock = SimulatedClock()
     begin = time.monotonic()

@@ -20,6 +20,7 @@ from pathlib import Path
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.bench import FOUND, Bench, CoilLimits
+from tactile_lab.clock import steady
 from tactile_lab.errors import LimitError
 from tactile_lab.instruments.guard_log import switched_off
 from tactile_lab.instruments.port import kept_of_port, lasting_name
@@ -78,11 +79,11 @@ class CoilHeat:
         """
         if (kept := self._kept()) is None:
             return 0.0
-        heating, same, steady, wall = kept
+        heating, same, until, wall = kept
         if heating:
             # who has it drives it, and has its port as well, which says more
             return self._longest if self.lost else 0.0
-        left = steady - time.monotonic() if same else wall - time.time()
+        left = until - steady() if same else wall - time.time()
         return min(max(left, 0.0), self._longest)
 
     @property
@@ -141,8 +142,8 @@ class CoilHeat:
         try:
             kept = json.loads(self.path.read_bytes())
             heating, boot = kept["heating"] is True, kept["boot"]
-            steady, wall = float(kept["cold_steady_s"]), float(kept["cold_wall_s"])
-            if not math.isfinite(steady + wall):
+            until, wall = float(kept["cold_steady_s"]), float(kept["cold_wall_s"])
+            if not math.isfinite(until + wall):
                 raise ValueError("a time that is no number")
             owner = int(kept.get("owner", 0))
         except FileNotFoundError:
@@ -156,9 +157,9 @@ class CoilHeat:
         same = bool(boot) and boot == _boot()
         off = switched_off(owner, wall - self._longest) if heating else None
         if off is None:
-            return heating, same, steady, wall
+            return heating, same, until, wall
         # by the clock that nobody sets, it did not cool for longer than since it began
-        return False, same, steady + off - (wall - self._longest), off + self._longest
+        return False, same, until + off - (wall - self._longest), off + self._longest
 
     def check(self) -> None:
         """Refuse where how warm the coil is cannot be told, or cannot be kept later.
@@ -193,7 +194,7 @@ class CoilHeat:
         """
         told = {
             "heating": heating,
-            "cold_steady_s": time.monotonic() + left,
+            "cold_steady_s": steady() + left,
             "cold_wall_s": time.time() + left,
             "boot": _boot(),
             "owner": os.getpid(),

@@ -26,6 +26,7 @@ from tactile_lab.acquisition.program import SETTLED, Program
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Bench, OffReport
+from tactile_lab.clock import steady
 from tactile_lab.drive import Drive
 from tactile_lab.engine.bench import open_bench
 from tactile_lab.engine.coil_heat import CoilHeat
@@ -211,14 +212,14 @@ class Execution(Task[Executed]):
             return Ending(events.RunState.FAULTED, off, str(error), error)
         if not (left := heat.left()):
             return None
-        cold = time.monotonic() + left
+        cold = steady() + left
         text = (
             f"The coil is still warm from a run before{before}. This one begins in "
             f"{left:.0f} s, when it counts as cold, as its plan takes it to be. "
             "Stop ends the waiting."
         )
         self._emit(events.Message("info", text))
-        while cold > time.monotonic() and not self.stop.requested:
+        while cold > steady() and not self.stop.requested:
             time.sleep(LOOK)
         return None
 
