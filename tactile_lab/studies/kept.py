@@ -75,6 +75,15 @@ class Kept:
         return not OF_A_POINT & _names(_compiled(self.name, self.expression))
 
     @property
+    def uses_spikes(self) -> bool:
+        """Whether it is told from the spikes that were found."""
+        if self.source:
+            return False
+        if self.expression in OF_TRAINS:
+            return True
+        return "spikes" in _names(_compiled(self.name, self.expression))
+
+    @property
     def needs_times(self) -> bool:
         """Whether number, first and last of the spikes are not enough."""
         short = {*OF_TRAINS, CRITICAL_FORCE} - {"spike_times"}

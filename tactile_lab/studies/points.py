@@ -195,10 +195,20 @@ class Points:
             keep_times=any(one.needs_times for one in self._study.kept),
         )
 
-    def _kept(self, names: Mapping[str, Any]) -> tuple[dict[str, Value], str]:
-        """Of one point, by the names it gives; what fails takes nothing with it."""
+    def _kept(
+        self, names: Mapping[str, Any], uncounted: str = ""
+    ) -> tuple[dict[str, Value], str]:
+        """Of one point, by the names it gives; what fails takes nothing with it.
+
+        Args:
+            names: what expressions may use.
+            uncounted: why its spikes are no count; "" where they are one.
+        """
         found, why = {}, []
         for one in self._study.kept:
+            if uncounted and one.uses_spikes:
+                why.append(f"{one.name}: {uncounted}")
+                continue
             try:
                 found[one.name] = one.of(names)
             except ParameterError as error:
@@ -256,6 +266,7 @@ class Points:
         from tactile_lab.report.findings import find
         from tactile_lab.report.from_run import read
         from tactile_lab.store.run import Run
+        from tactile_lab.store.uncounted import uncounted
 
         seed = int(seeds_of(self._study, np.array([repeat]))[0])
         scene = replace(scene, simulated=replace(scene.simulated, seed=seed))
@@ -287,7 +298,11 @@ class Points:
             }
             if any("answer" in one.expression for one in self._study.kept):
                 names["answer"] = find(read(done.folder)).conclusion.plain
-            return self._kept(names)
+            if run.info.get("detection") is None:
+                why = "spikes were not looked for; put spikes into record.signals"
+            else:
+                why = "; ".join(dict.fromkeys(filter(None, uncounted(run))))
+            return self._kept(names, why)
 
     def _scene(self, values: Sequence[Any]) -> Scene:
         return load(self._study.scene, changed(self._study.design.axes, values))

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -201,6 +202,29 @@ def test_the_whole_bench_repeats_with_seeds(tmp_path: Path) -> None:
     assert found.failed == 0, found.reasons
     assert numbers["count"].shape == (2,) and np.all(numbers["count"] > 0)
     assert numbers["noise"][0] != numbers["noise"][1]
+
+
+@pytest.mark.parametrize(
+    ("recorded", "why"),
+    [
+        ({"record.sample_rate": "100 kS/s"}, "spikes are missed: one fits between"),
+        ({"record.signals": ["V_C1", "force"]}, "spikes were not looked for"),
+    ],
+)
+def test_spikes_that_are_no_count_are_not_kept_as_one(
+    tmp_path: Path, recorded: dict[str, Any], why: str
+) -> None:
+    """5 of 16 were kept and drawn, of runs that refuse their own rates."""
+    asked = {
+        **SHORT,
+        "on": "simulated",
+        "set": {**SHORT["set"], **recorded},
+        "keep": {"count": "len(spikes)", "rest": "run.signal('V_C1')[:200].mean()"},
+    }
+    found, _ = done(load_study(asked), tmp_path)
+    numbers = found.numbers()
+    assert np.isnan(numbers["count"]).all() and np.isfinite(numbers["rest"]).all()
+    assert all(f"count: {why}" in reason for reason in found.reasons)
 
 
 def test_a_fitted_number_of_the_answer_is_kept_by_its_value(tmp_path: Path) -> None:
