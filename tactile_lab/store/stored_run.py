@@ -118,7 +118,7 @@ class StoredRun:
     def refresh(self) -> None:
         """See what a living writer has added since."""
         self.info = read_info(self.path)
-        for name in ("applied", "force"):
+        for name in ("applied", "axis", "force", "samples"):
             vars(self).pop(name, None)
 
         def renew(name: str, node: Any) -> None:
@@ -159,7 +159,7 @@ class StoredRun:
         groups = (self._file.get(kind) for kind in ("checks", "pyramid"))
         return tuple(sorted({name for group in groups for name in group or ()}))
 
-    @property
+    @cached_property
     def samples(self) -> int:
         """Samples per channel that all channels have, checksum included."""
         lengths = [self.stored(name) for name in self.signals]
@@ -199,7 +199,7 @@ class StoredRun:
         joined = [(first[a], stop[b - 1]) for a, b in pairwise(edges)]
         return self.axis.time_of(np.array(joined))
 
-    @property
+    @cached_property
     def axis(self) -> TimeAxis:
         """Where stored samples lie in time."""
         rows = self.records("segments")
