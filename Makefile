@@ -5,6 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUN_STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
+SIMULATORS_STAMP := $(VENV)/.installed-simulators
 SYSTEM_STAMP := $(VENV)/.installed-system
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_ROOT_USER_ACTION := ignore
@@ -29,11 +30,13 @@ demo: $(RUN_STAMP)
 gui: $(DEV_STAMP)
 	$(BIN)/tactile-lab gui
 
-test: $(DEV_STAMP) $(SYSTEM_STAMP)
-	# what is compiled is compiled once, beside the types, or each worker does it
+test: $(DEV_STAMP)
+	# what is compiled is compiled once, or each worker does it; meanwhile types are
+	# checked, and what else tests need is fetched
 	{ $(BIN)/python tests/support/compile_once.py >$(VENV)/compiling 2>&1 || \
 	    { cat $(VENV)/compiling; exit 1; } } & compiling=$$!; \
-	    $(MAKE) --no-print-directory check && wait $$compiling
+	    $(MAKE) --no-print-directory $(SIMULATORS_STAMP) $(SYSTEM_STAMP) & fetching=$$!; \
+	    $(MAKE) --no-print-directory check && wait $$fetching && wait $$compiling
 	$(BIN)/python -m pytest -n auto --dist loadfile
 
 check: $(DEV_STAMP)
@@ -42,16 +45,16 @@ check: $(DEV_STAMP)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-fast: $(DEV_STAMP)
+fast: $(DEV_STAMP) $(SIMULATORS_STAMP)
 	$(BIN)/python -m pytest -x -q -m "not campaign" --ignore tests/gui
 
 # what the settled examples of `make test` do not try; a find becomes an @example
-search: $(DEV_STAMP)
+search: $(DEV_STAMP) $(SIMULATORS_STAMP)
 	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=search -n auto
 
 # hours on two cores, alone on the machine: says how many, and goes on where it was
 # stopped; every table states commit and date
-reports: $(DEV_STAMP)
+reports: $(DEV_STAMP) $(SIMULATORS_STAMP)
 	$(BIN)/python docs/make_reports.py
 
 screenshots: $(DEV_STAMP)
@@ -74,8 +77,11 @@ $(RUN_STAMP): pyproject.toml | $(BIN)/python
 $(DEV_STAMP): pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install -q --upgrade "pip>=25.1"
 	$(BIN)/python -m pip install -q -e ".[gui]" --group dev
-	$(BIN)/python -m pip install -q --no-deps --upgrade --target $(VENV)/simulators --group simulators
 	@touch $@ $(RUN_STAMP)
+
+$(SIMULATORS_STAMP): pyproject.toml $(DEV_STAMP)
+	$(BIN)/python -m pip install -q --no-deps --upgrade --target $(VENV)/simulators --group simulators
+	@touch $@
 
 $(SYSTEM_STAMP): .ci/system-packages | $(BIN)/python
 	@.ci/install-system-packages
