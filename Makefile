@@ -79,8 +79,9 @@ $(DEV_STAMP): pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install -q -e ".[gui]" --group dev
 	@touch $@ $(RUN_STAMP)
 
+# compiled as it is imported: of SymPy and others little ever is
 $(SIMULATORS_STAMP): pyproject.toml $(DEV_STAMP)
-	$(BIN)/python -m pip install -q --no-deps --upgrade --target $(VENV)/simulators --group simulators
+	$(BIN)/python -m pip install -q --no-compile --no-deps --upgrade --target $(VENV)/simulators --group simulators
 	@touch $@
 
 $(SYSTEM_STAMP): .ci/system-packages | $(BIN)/python
