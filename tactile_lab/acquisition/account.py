@@ -214,9 +214,11 @@ class Account:
             time = self.axis(one.time) + ((later or 0.0) if one.listed else 0.0)
             self._written = max(time, self._written)
             row = self._written, one.setpoint, one.measured, one.ratio
-            asked = None if one.listed else self.axis(one.asked)
-            listed = told if one.listed else 0
-            self.journal.current(*row, listed=listed, asked=asked)
+            if one.listed:
+                self.journal.current(*row, listed=told)
+            else:
+                sent, acted = self.axis(one.asked), self.axis(one.acted)
+                self.journal.current(*row, asked=sent, acted=acted)
         self._unwritten = []
 
     def field(self, time: float, tesla: float) -> None:

@@ -41,12 +41,13 @@ class Journal(Protocol):
         *,
         listed: int = 0,
         asked: float | None = None,
+        acted: float | None = None,
     ) -> None:
         """A set-point as applied, A; read-back and resistance over cold, if known.
 
         `listed`: 0, or for a point of a list what told when that began:
         `tactile_lab.store.applied.BY_SAMPLES` or `BY_HOST`. `asked`: when the source
-        was told to, s.
+        was told to, s; `acted`: when it is taken to have done so.
         """
         return
 

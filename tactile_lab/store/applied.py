@@ -101,6 +101,7 @@ def applied_current(
     listed: ArrayLike = False,
     asked: ArrayLike = np.nan,
     visible: float = VISIBLE,
+    acted: ArrayLike = np.nan,
 ) -> AppliedCurrent:
     """Join what source and shunt tell.
 
@@ -116,6 +117,8 @@ def applied_current(
             `BY_HOST` where only the host told, else 0.
         asked: when the host sent each, s; not a number where that is not known.
         visible: smallest step an edge of which the shunt shows, A.
+        acted: when the source is taken to have acted on each, s: as its answer set out;
+            it dates them where the shunt does not, else `time`.
     """
     t, sent, read = (np.asarray(v, np.float64) for v in (time, setpoint, measured))
     if not t.size:
@@ -132,8 +135,10 @@ def applied_current(
     sent_at = np.broadcast_to(np.asarray(asked, np.float64), t.shape)[first].copy()
     sent_at[0] = np.nan  # it stood when the run began, and was read back
     doubt = _doubt(t[first] - np.where(own_clock, np.nan, sent_at))
+    answered = np.broadcast_to(np.asarray(acted, np.float64), t.shape)[first].copy()
+    answered[0] = np.nan
+    seen, bands = np.full(begin.size, np.nan), np.zeros(begin.size)
     if shunt is not None:
-        seen, bands = np.full(begin.size, np.nan), np.zeros(begin.size)
         width = BIN_TIME
         for i in np.flatnonzero(~own_clock[1:]) + 1:
             since = max(begin[i - 1], np.fmin(begin[i] - BEFORE, sent_at[i]))
@@ -156,8 +161,10 @@ def applied_current(
             begin[moved] -= np.interp(begin[moved], at, _of_three(early))
             away[moved] = np.maximum(at[0] - t[first], t[first] - at[-1])[moved]
             away = np.maximum(away, 0.0)
-        begin = np.maximum.accumulate(np.where(shown, seen, begin))
         doubt[shown] = 0.0
+    if edges < ENOUGH:
+        begin = np.fmin(begin, answered)
+    begin = np.maximum.accumulate(np.where(np.isfinite(seen), seen, begin))
     begin = np.maximum.accumulate(begin - doubt)
     steps = np.column_stack([begin, level])
     by_host = bool(np.any(dated == BY_HOST))

@@ -46,7 +46,7 @@ TABLES = {
     "overrange": "sample i8 sample, samples i8 sample, channels u4 bit per row",
     "spikes": "sample f8 sample, time f8 s, amplitude i2 code, width f4 sample",
     "current": "time f8 s, setpoint f8 A, measured f8 A, resistance_ratio f8 1, "
-    "listed u1, asked f8 s",
+    "listed u1, asked f8 s, acted f8 s",
     "field": "time f8 s, field f8 T",
     "temperature": "time f8 s, temperature f8 K",
     "voltages": "time f8 s, name S8, setpoint f8 V, measured f8 V, current f8 A",

@@ -130,13 +130,16 @@ class Recorder:
         *,
         listed: int = 0,
         asked: float | None = None,
+        acted: float | None = None,
     ) -> None:
         """Store a set-point and its read-back, A, and the resistance over cold.
 
-        `listed` and `asked`: as `tactile_lab.store.applied.applied_current` takes them.
+        `listed`, `asked` and `acted`: as
+        `tactile_lab.store.applied.applied_current` takes them.
         """
-        known = _number(measured), _number(ratio)
-        self._add("current", time, setpoint, *known, listed, _number(asked))
+        known, on_way = (measured, ratio), (asked, acted)
+        row = time, setpoint, *map(_number, known), listed, *map(_number, on_way)
+        self._add("current", *row)
 
     def field(self, time: float, field: float) -> None:
         """Store a teslameter reading, T."""

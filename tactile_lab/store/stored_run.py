@@ -395,6 +395,7 @@ class StoredRun:
             rows["listed"] if "listed" in columns else False,
             rows["asked"] if "asked" in columns else np.nan,
             self.visible_step,
+            rows["acted"] if "acted" in columns else np.nan,
         )
 
     @cached_property

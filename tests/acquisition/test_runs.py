@@ -537,3 +537,16 @@ def test_a_fault_keeps_its_exit_code_whatever_signal_comes_after():
         for state in (RunState.FAULTED, RunState.ABORTED, RunState.COMPLETE)
     ]
     assert codes == [3, 143, 0]
+
+
+def test_steps_that_no_shunt_shows_are_dated_by_the_answer_of_the_source(run_scene):
+    """By when it had come they were 7 ms late, and a force told by spikes too small."""
+    changes = 'protocol.levels=["120 mN"]', "protocol.hold=0.2 s", "protocol.rest=0.1 s"
+    found = []
+    for recorded in ('["V_K"]', '["V_K", "coil_current"]'):
+        ran = run_scene(*changes, f"record.signals={recorded}")
+        with ran.stored() as run:
+            found.append(run.applied.steps)
+    by_answer, by_shunt = found
+    assert by_answer.shape == by_shunt.shape
+    assert np.abs(by_answer - by_shunt)[1:, 0].max() < 1e-3
