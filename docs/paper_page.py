@@ -61,8 +61,8 @@ def page(
             "Fig. 1c", "swing 330 mV/decade",
             f"{swing.swing.value * 1e3:.1f} (fit to Table 1's curve)",
             percent(swing.swing.value, 0.33),
-            f"Table 1 rounds V_T: 5.646 × {warm * 1e3:.1f} mV × ln 10 = 330, V_T at "
-            f"{warm / 8.617333e-5 - 273.15:.0f} °C",
+            f"Table 1 rounds V_T: 5.646 × {warm * 1e3:.2f} mV × ln 10 = 330, V_T at "
+            f"{warm / 8.617333e-5 - 273.15:.1f} °C",
         ),
         (
             "Fig. 1c", "threshold voltage 2.75 V, exponential below",
@@ -175,7 +175,7 @@ No measured curve is available. On a curve computed from Table 1 with 5 % noise 
 gives {swing.swing.value * 1e3:.1f} mV/decade ({swing.swing.low * 1e3:.1f} to
 {swing.swing.high * 1e3:.1f}), m = {swing.m.value:.3f}, I_S = {swing.I_S.value:.3g} A.
 m V_T ln 10 with Table 1's m and its V_T of 25 mV is 325 mV/decade; with
-{warm * 1e3:.1f} mV, V_T at {warm / 8.617333e-5 - 273.15:.0f} °C, it is the 330 that the
+{warm * 1e3:.2f} mV, V_T at {warm / 8.617333e-5 - 273.15:.1f} °C, it is the 330 that the
 paper prints.
 
 {picture("output", "Output curves")}
