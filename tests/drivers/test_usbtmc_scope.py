@@ -165,26 +165,21 @@ def test_settings_the_scope_refuses_are_told() -> None:
         lab.records(1)
 
 
-def test_a_knob_turned_meanwhile_is_noticed() -> None:
+@pytest.mark.parametrize(
+    ("knob", "turned", "told"),
+    [
+        ("scale", 0.5, r"V_C1 .* Leave its knobs alone"),
+        ("offset", 0.2, r"V_C1 .* offset 0\.2 V .* knobs"),
+    ],
+)
+def test_a_knob_turned_meanwhile_is_noticed(knob, turned, told) -> None:
+    """Of a trace moved by hand all volts were wrong by as much, and nobody was told."""
     lab = Lab()
     with lab.clock.taking_part("scope"):
         lab.scope.open()
         lab.scope.start(TRIO, 1e-6)
-        lab.rigol.channels["1"].scale = 0.5
-        with pytest.raises(BadReplyError, match=r"V_C1 .* Leave its knobs alone"):
-            for _ in range(100):
-                lab.clock.sleep_until(lab.clock.now() + 0.02)
-                lab.scope.poll()
-
-
-def test_a_trace_moved_by_hand_is_noticed() -> None:
-    """Its volts were all wrong by as much, and nobody was told."""
-    lab = Lab()
-    with lab.clock.taking_part("scope"):
-        lab.scope.open()
-        lab.scope.start(TRIO, 1e-6)
-        lab.rigol.channels["1"].offset = 0.2
-        with pytest.raises(BadReplyError, match=r"V_C1 .* offset 0\.2 V .* knobs"):
+        setattr(lab.rigol.channels["1"], knob, turned)
+        with pytest.raises(BadReplyError, match=told):
             for _ in range(100):
                 lab.clock.sleep_until(lab.clock.now() + 0.02)
                 lab.scope.poll()
