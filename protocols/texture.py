@@ -76,7 +76,7 @@ class Texture(ForceProtocol):
                     rest=self.rest,
                     highest=speed / self._length * self._details,
                 )
-                for begin in (self._begins(0), self._begins(1))
+                for begin in (0.0, self._length / 2)
             ]
             for number in range(self.passes):
                 force, hold = forces[turned_over(number)]

@@ -83,8 +83,8 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
     samples = round(drive.streamed * scene.record.sample_rate)
     if not needed.channels:
         samples = 0
-    raw = samples * len(needed.stored) * BYTES_PER_SAMPLE
     stored = samples * len(needed.stored)
+    raw = stored * BYTES_PER_SAMPLE
     breaks = sum(_stops_stream(step) for step in drive.steps) if stored else 0
     again = REWRITTEN * scene.record.sample_rate * len(needed.stored) * BYTES_PER_SAMPLE
     most = REPORT[1] + PYRAMID * stored + breaks * again / COMPRESSION

@@ -68,20 +68,21 @@ class Kept:
     @property
     def of_spikes(self) -> bool:
         """Whether a point's spikes and force are all it needs."""
-        if self.source:
-            return False
-        if self.expression in OF_TRAINS:
-            return True
-        return not OF_A_POINT & _names(_compiled(self.name, self.expression))
+        return not OF_A_POINT & self._used
 
     @property
     def uses_spikes(self) -> bool:
         """Whether it is told from the spikes that were found."""
+        return "spikes" in self._used
+
+    @property
+    def _used(self) -> frozenset[str]:
+        """Names of a point that it looks up; a function is given the run or result."""
         if self.source:
-            return False
+            return frozenset({"run", "result"})
         if self.expression in OF_TRAINS:
-            return True
-        return "spikes" in _names(_compiled(self.name, self.expression))
+            return frozenset({"spikes"})
+        return frozenset(_names(_compiled(self.name, self.expression)))
 
     @property
     def needs_times(self) -> bool:

@@ -33,6 +33,7 @@ from tactile_lab.whole_file import write_text
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Executed
     from tactile_lab.engine.execution import Execution
+    from tactile_lab.store.run import Run
 
 RUNS, BY_POINT = "runs", "by-point"
 """Folders of a study: of the runs that are kept, and in it files by the addresses of
@@ -266,7 +267,6 @@ class Points:
         from tactile_lab.report.findings import find
         from tactile_lab.report.from_run import read
         from tactile_lab.store.run import Run
-        from tactile_lab.store.uncounted import uncounted
 
         seed = int(seeds_of(self._study, np.array([repeat]))[0])
         scene = replace(scene, simulated=replace(scene.simulated, seed=seed))
@@ -298,11 +298,17 @@ class Points:
             }
             if any("answer" in one.expression for one in self._study.kept):
                 names["answer"] = find(read(done.folder)).conclusion.plain
-            if run.info.get("detection") is None:
-                why = "spikes were not looked for; put spikes into record.signals"
-            else:
-                why = "; ".join(dict.fromkeys(filter(None, uncounted(run))))
-            return self._kept(names, why)
+            return self._kept(names, self._uncounted(run))
+
+    def _uncounted(self, run: Run) -> str:
+        """Why the spikes of a run are no count; "" where they are, or are not kept."""
+        from tactile_lab.store.uncounted import uncounted
+
+        if not any(one.uses_spikes for one in self._study.kept):
+            return ""
+        if run.detection is None:
+            return "spikes were not looked for; put spikes into record.signals"
+        return "; ".join(dict.fromkeys(filter(None, uncounted(run))))
 
     def _scene(self, values: Sequence[Any]) -> Scene:
         return load(self._study.scene, changed(self._study.design.axes, values))
