@@ -73,7 +73,7 @@ def endurance(seconds: float, folder: Path) -> None:
     fault = "" if session.status.fault is None else f": {session.status.fault.title}"
     assert session.source is not None
     bench.say(
-        f"Then {session.state.value} {fault}, {session.source.spikes.size} spikes."
+        f"Then {session.state.value}{fault}, {session.source.spikes.size} spikes."
     )
     bench.window.close()
     session.close()
