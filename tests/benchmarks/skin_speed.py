@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -17,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from day_long import memory
 from provenance import provenance, tell
 
 from tactile_lab.model.circuit import Circuit
@@ -183,12 +183,12 @@ def grown(rows: int, columns: int, seconds: int, how: str) -> str:
     size = rows * columns
     active = int((events.role <= kernel.SILENT).sum())
     fired, spikes = int((events.count > 0).sum()), int(events.count.sum())
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    most = memory(os.getpid(), "VmHWM")  # ru_maxrss is the parent's, too
     return (
         f"| {how} | {size:,} | {active:,} | {fired:,} | {spikes:,} | "
         f"{cpu:.2f} s | {cpu / size * 1e6:,.1f} µs | "
         f"{cpu / max(spikes, 1) * 1e6:,.2f} µs | "
-        f"{wall:.2f} s | {seconds / wall:.2f} | {memory:,.0f} MiB | "
+        f"{wall:.2f} s | {seconds / wall:.2f} | {most:,.0f} MiB | "
         f"{os.getloadavg()[0]:.1f} |"
     )
 
