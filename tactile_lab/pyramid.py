@@ -34,6 +34,7 @@ class Level:
     Args:
         keep: how many cells are kept; there is room for a quarter more.
         signal: of the traces it gives.
+        room: cells there is room for at first.
 
     Attributes:
         width: of a cell, s; 0 before the first.
@@ -41,15 +42,15 @@ class Level:
         count: cells added so far, forgotten ones included.
     """
 
-    def __init__(self, keep: int, signal: str = "") -> None:
+    def __init__(self, keep: int, signal: str = "", room: int = ROOM) -> None:
         self.width = 0.0
         self.end = 0.0
         self._signal = signal
         self.count = 0
         self._keep = keep
         self._first, self._last = 0, 0
-        self._values = np.empty((4, ROOM))
-        self._gap = np.empty(ROOM, np.bool_)
+        self._values = np.empty((4, room))
+        self._gap = np.empty(room, np.bool_)
 
     def __len__(self) -> int:
         return self._last - self._first
@@ -133,16 +134,16 @@ class Pyramid:
     kept, may be read or computed elsewhere and put in by `refine`.
     """
 
-    def __init__(self) -> None:
-        self._levels = [Level(FINE)]
+    def __init__(self, room: int = ROOM) -> None:
+        self._levels = [Level(FINE, room=room)]
         self._open: list[int] = [0]
         self._waiting = 0
         self._parts: tuple[tuple[float, float, Trace], ...] = ()
 
     @classmethod
     def of(cls, whole: Trace) -> Pyramid:
-        """A signal that is known already."""
-        made = cls()
+        """A signal that is known already, in no more memory than it needs."""
+        made = cls(room=min(len(whole), FINE))
         made.add(whole)
         return made
 

@@ -1,6 +1,7 @@
 """What holds of every trace: nothing that was measured is lost, nothing is invented."""
 
 import itertools
+import tracemalloc
 
 import numpy as np
 from hypothesis import example, given, settings
@@ -183,6 +184,19 @@ def test_coarser_levels_do_not_depend_on_the_blocks(sizes: list[int]) -> None:
         seen = fed.between(0.0, 1e6, 50)
         assert seen.extent == whole[:at].extent, "the newest cell is in the picture"
     same(fed.between(0.0, 1e6, 50), Pyramid.of(whole).between(0.0, 1e6, 50))
+
+
+def test_a_signal_that_is_known_takes_the_memory_of_its_cells() -> None:
+    time = np.arange(50_000) * WIDTH
+    whole = Trace.bins(time, time, time, time, WIDTH)
+    cells = 4 * time.nbytes + time.size
+    tracemalloc.start()
+    try:
+        kept = Pyramid.of(whole)
+        taken = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    assert kept.end == whole.end and taken < 1.2 * cells
 
 
 def test_a_pyramid_forgets_details_but_no_spike() -> None:
