@@ -23,8 +23,13 @@ NO_FOLLOWERS = Followers(input_bias=0.0, bandwidth=0.0)
 """Probes that lie at the nodes themselves."""
 
 
-def plant_of(scene: Scene, world: PlantOptions | None = None) -> Plant:
-    """The physical world of a scene's simulated bench, or `world` with its sensor."""
+def plant_of(
+    scene: Scene, world: PlantOptions | None = None, *, sampled: bool = True
+) -> Plant:
+    """The physical world of a scene's simulated bench, or `world` with its sensor.
+
+    `sampled`: whether a scope may look at it.
+    """
     simulated = scene.simulated
     part = specimen(scene.sensor.circuit, simulated.specimen)
     true = simulated.deviation.circuit(part)
@@ -35,6 +40,7 @@ def plant_of(scene: Scene, world: PlantOptions | None = None) -> Plant:
         world or options(scene),
         simulated.seed,
         beyond={n: getattr(true, n) - getattr(believed, n) for n in SOURCED},
+        sampled=sampled,
     )
 
 
@@ -112,9 +118,12 @@ def open_bench(
             simulated far end.
     """
     clock: Clock = RealClock() if realtime else SimulatedClock()
-    plant, scope = plant_of(scene, world), scene.bench.scope
-    inputs = None
-    if needed.channels and scope is not None:
+    scope, inputs = scene.bench.scope, None
+    sampled = scope is not None and bool(needed.channels)
+    plant = plant_of(scene, world, sampled=sampled)
+    if scope is not None and sampled:
+        import sim_backend.plant.render  # noqa: F401  compiled, so not while time runs
+
         inputs = WiredInputs(plant, scope.channels)
         if realtime:
             _compile(plant_of(scene, world), needed.channels)

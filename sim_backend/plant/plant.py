@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,6 @@ from sim_backend.plant.electromagnet import Electromagnet
 from sim_backend.plant.noise import NoiseSource, SensorNoise
 from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.pieces import Pieces
-from sim_backend.plant.render import noise_table
 from sim_backend.plant.scope_input import PLACED, ScopeInput, scope_inputs
 from sim_backend.plant.sensor import NEEDS, SimulatedSensor
 from tactile_lab.arrays import FloatArray
@@ -75,6 +75,7 @@ class Plant(DrivenCoil):
         options: which parts of the world there are.
         seed: of all noise; the same seed and commands give the same codes.
         beyond: by how much the circuit's voltages exceed what a source gives, V.
+        sampled: whether a scope may look at it: else the circuit is not solved.
     """
 
     def __init__(
@@ -84,8 +85,10 @@ class Plant(DrivenCoil):
         options: PlantOptions | None = None,
         seed: int = 1,
         beyond: Mapping[str, float] | None = None,
+        *,
+        sampled: bool = True,
     ) -> None:
-        self._beyond = beyond or {}
+        self._beyond, self._sampled = beyond or {}, sampled
         self._sourced = 0.0
         self.options = options = options or PlantOptions()
         self.circuit = replace(circuit, I_bias=circuit.I_bias + options.bias)
@@ -103,7 +106,6 @@ class Plant(DrivenCoil):
         self._kelvin = temperature(self.circuit)
         warmer = options.warmer if options.warming else None
         self._sensor = SimulatedSensor(self.circuit, self._drive, fire, warmer)
-        self._noise = noise_table(seed)
         swing = self.circuit.fire_voltage - self.circuit.reset_voltage
         self._spike = options.speed.spike(swing, self.circuit.tau_K)
         self._edge = options.speed.edge(swing)
@@ -154,6 +156,13 @@ class Plant(DrivenCoil):
             f"Simulated circuit, by its own estimate: {' and '.join(told)} of the "
             "exact solution; force between set-points within 1e-4 of a step."
         )
+
+    @cached_property
+    def _noise(self) -> NDArray[np.int16]:
+        """The table of noise, made where a scope samples."""
+        from sim_backend.plant.render import noise_table
+
+        return noise_table(self.seed)
 
     def render(
         self,
@@ -217,10 +226,11 @@ class Plant(DrivenCoil):
         if self._electromagnet.command(time, self._driven):
             self._sensor.commanded(time)
         if self._electromagnet.commands > BACKLOG:
-            # the model must have passed what the electromagnet forgets
-            old = self._electromagnet.time_of(BACKLOG // 2)
-            self._sensor.reach(old)
-            self._sensor.forget(old)
+            if self._sampled:
+                # the model must have passed what the electromagnet forgets
+                old = self._electromagnet.time_of(BACKLOG // 2)
+                self._sensor.reach(old)
+                self._sensor.forget(old)
             self._electromagnet.forget(BACKLOG // 2)
 
     def _effective(self, time: float) -> float:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from sim_backend.plant.chain import Pulse
 from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.pieces import Pieces
-from sim_backend.plant.render import NOISE_UNIT, add_pulses, digitise
 from tactile_lab.arrays import FloatArray
 from tactile_lab.scope import Channel
 
@@ -74,6 +73,9 @@ class ScopeInput:
         Returns:
             Whether the input left its range.
         """
+        # compiled code, loaded where a scope samples
+        from sim_backend.plant.render import NOISE_UNIT, add_pulses, digitise
+
         value, slope = pieces.value * self.gain + self.level, pieces.slope * self.gain
         # the kernels add two entries of the table
         unit = self.noise / (NOISE_UNIT * math.sqrt(2))

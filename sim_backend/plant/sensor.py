@@ -11,19 +11,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from sim_backend.plant.pieces import Pieces, join
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
-from tactile_lab.model.advance import State, advance, rest
 from tactile_lab.model.circuit import Circuit
-from tactile_lab.model.equations import rest_V_C2
-from tactile_lab.model.solution import Solution
+from tactile_lab.model.equations import rest, rest_V_C2
+from tactile_lab.model.state import State
 from tactile_lab.model.temperature import at_temperature, temperature
 from tactile_lab.waveform import Waveform
+
+if TYPE_CHECKING:
+    from tactile_lab.model.solution import Solution
 
 SHORTEST, LONGEST = 10e-3, 60.0
 """Length of a chunk just after a command, and long after one, s; it doubles between."""
@@ -115,7 +118,12 @@ class SimulatedSensor:
         self.error_V_C1 = 0.0
         self._keep: tuple[str, ...] = ()
         self._chunks: list[_Chunk] = []
-        self._frontier = rest(circuit, force=float(drive.force(0.0, 0.0).value[0]))
+        self._at_rest = float(drive.force(0.0, 0.0).value[0])
+
+    @cached_property
+    def _frontier(self) -> State:
+        """The state up to which it is solved; first at rest."""
+        return rest(self.circuit, force=self._at_rest)
 
     @property
     def latest(self) -> Circuit:
@@ -148,7 +156,7 @@ class SimulatedSensor:
 
     def commanded(self, time: float) -> None:
         """A command takes effect at `time` s: what was solved beyond is void."""
-        if time >= self._frontier.time:
+        if not self._chunks or time >= self._frontier.time:
             return
         for i, chunk in enumerate(self._chunks):
             if chunk.end > time:
@@ -258,6 +266,8 @@ class SimulatedSensor:
         return replace(circuit, V_fire=volts, V_reset=reset)
 
     def _advance(self, circuit: Circuit, state: State, until: float) -> Solution:
+        from tactile_lab.model.advance import advance
+
         force = self._drive.force(state.time, until)
         keep = self._keep or ("V_C1",)
         solved = advance(circuit, state, force, until, keep=keep)

@@ -3,7 +3,7 @@
 import os
 
 import pytest
-from loaded import force_only, simulated, spikes_only
+from loaded import force_only, force_simulated, simulated, spikes_only
 
 
 def rooms(names):
@@ -17,6 +17,14 @@ def test_a_run_of_force_alone_loads_a_source_and_nothing_else(tmp_path):
     assert not rooms(names) & {"usb", "numba", "sim_backend", "gui", "matplotlib"}
     assert not names & {"drivers.teslameter", "drivers.picoscope", "drivers.usbtmc"}
     assert not names & {"tactile_lab.model.solver", "tactile_lab.spikes.detector"}
+
+
+def test_a_simulated_run_of_force_alone_loads_no_compiled_code(tmp_path):
+    """Neither the sensor's model nor the scope's converter has anything to do."""
+    names = force_simulated(tmp_path)
+    assert "sim_backend.plant.plant" in names
+    assert "numba" not in names
+    assert not names & {"sim_backend.plant.render", "tactile_lab.model.solver"}
 
 
 def test_a_run_of_spikes_alone_loads_no_teslameter(tmp_path):

@@ -8,7 +8,9 @@ from plant_world import (
     CHANNELS,
     FULL,
     IDEAL,
+    MAGNET,
     QUIET,
+    SHARP,
     SHIFT,
     newtons,
     plant,
@@ -16,9 +18,11 @@ from plant_world import (
     volts,
 )
 
-from sim_backend.plant import sensor
 from sim_backend.plant.options import PlantOptions
+from sim_backend.plant.plant import Plant
 from tactile_lab.errors import ParameterError
+from tactile_lab.model import advance
+from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
 from tactile_lab.scope import Channel
 from tactile_lab.waveform import Waveform
@@ -108,14 +112,14 @@ def test_only_what_a_channel_depends_on_is_solved(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     stages: list[dict[str, int]] = []
-    real = sensor.advance
+    real = advance.advance
 
     def counted(*args: object, **options: object) -> object:
         solved = real(*args, **options)  # type: ignore[arg-type]
         stages.append(solved.stages)
         return solved
 
-    monkeypatch.setattr(sensor, "advance", counted)
+    monkeypatch.setattr(advance, "advance", counted)
     render(plant(IDEAL), 0.01, channels=(CHANNELS[3],))
     assert not stages
     made = plant(IDEAL)
@@ -144,6 +148,18 @@ def test_a_backlog_of_commands_is_worked_off(monkeypatch: pytest.MonkeyPatch) ->
         codes.append(made.render(0, 200, 1e-3, 0.5, CHANNELS, FULL, SHIFT)[0])
     assert np.array_equal(codes[0][0], codes[1][0])
     assert np.array_equal(codes[0][3], codes[1][3])
+
+
+def test_a_circuit_that_no_scope_looks_at_is_never_solved(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("sim_backend.plant.plant.BACKLOG", 16)
+    made = Plant(Circuit(), MAGNET, SHARP, sampled=False)
+    made.output(0.0, True)
+    for k in range(50):
+        made.set_current(k * 0.01, newtons(0.1 * (k % 3)))
+    assert made.force(0.5) == pytest.approx(0.1)
+    assert made.accuracy() == ""
 
 
 def test_what_was_forgotten_is_not_made_up() -> None:
@@ -203,13 +219,13 @@ def test_an_hour_nobody_looked_at_is_passed_in_few_solves(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     solved = []
-    real = sensor.advance
+    real = advance.advance
 
     def counted(*args: object, **options: object) -> object:
         solved.append(args)
         return real(*args, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(sensor, "advance", counted)
+    monkeypatch.setattr(advance, "advance", counted)
     made = plant(IDEAL)
     before = render(made, 0.01)
     made.set_current(3600.05, newtons(0.2))

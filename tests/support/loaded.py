@@ -1,4 +1,4 @@
-"""What one command line loads, in a process of its own; run it to print three lists."""
+"""What one command line loads, in a process of its own; run it to print the lists."""
 
 from __future__ import annotations
 
@@ -80,6 +80,12 @@ def force_only(folder: Path) -> set[str]:
         served.close()
 
 
+def force_simulated(folder: Path) -> set[str]:
+    """After a run that only drives the simulated coil, and its report."""
+    (folder / "force.toml").write_text(FORCE_ONLY)
+    return loaded_after("run", "force.toml", folder=folder)
+
+
 def spikes_only(folder: Path) -> set[str]:
     """After a run that only detects spikes, on the simulated bench."""
     return loaded_after("run", "spikes_only", "--no-report", folder=folder)
@@ -91,8 +97,8 @@ def simulated(folder: Path) -> set[str]:
 
 
 def main() -> None:
-    """Print the three lists, as counts."""
-    for which in (force_only, spikes_only, simulated):
+    """Print the lists, as counts."""
+    for which in (force_only, force_simulated, spikes_only, simulated):
         with tempfile.TemporaryDirectory() as folder:
             names = which(Path(folder))
         rooms = Counter(name.partition(".")[0] for name in names)
