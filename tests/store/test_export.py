@@ -25,7 +25,7 @@ def run(bench, recorder, folder):
     bench.play(recorder, made, 500)
     recorder.pause(3.0, 53.0)
     bench.play(recorder, made, 500, start=53.0, source=bench.stream(started=63.0))
-    recorder.current(0.5, 0.25, 0.24)
+    recorder.current(0.5, 0.25, 0.24, asked=0.44, acted=0.47)
     recorder.current(54.0, 0.5, None)
     recorder.field(0.6, 11e-3)
     trial = Trial(force=Waveform.pulse(0.12, ramp=0.25, hold=2.0), label='the "120"')
@@ -71,6 +71,10 @@ def test_csv_has_units_in_its_header_and_si_values(run, tmp_path):
     assert head == ["time_s", "amplitude_V", "width_s"]
     np.testing.assert_allclose([float(x[0]) for x in body], run.spikes["time"])
     assert rows(tmp_path / "csv" / "trials.csv")[1][1] == 'the "120"'
+    # a current is dated by when the source acted; of the second nobody knows
+    head, *body = rows(tmp_path / "csv" / "current.csv")
+    assert head == ["time_s", "setpoint_A", "measured_A", "heard_s"]
+    assert body == [["0.47", "0.25", "0.24", "0.5"], ["54", "0.5", "", "54"]]
 
 
 def test_a_run_that_begins_a_trial_while_it_is_exported(run, tmp_path, monkeypatch):
@@ -164,6 +168,7 @@ def test_nwb_passes_its_inspector_with_spikes_in_seconds(run, tmp_path):
         np.testing.assert_allclose(volts, run.signal("V_K")[3000:6000])
         assert series.unit == "volts"
         assert session.trials["label"][0] == 'the "120"'
+        assert list(session.stimulus["applied_current"].timestamps) == [0.47, 54.0]
     messages = list(inspector.inspect_nwbfile(nwbfile_path=file))
     severe = [
         m

@@ -21,7 +21,7 @@ from tactile_lab.store.warned import told as warned_told
 UNITS = {
     "gaps": {"start": "s", "end": "s"},
     "spikes": {"time": "s", "amplitude": "V", "width": "s"},
-    "current": {"time": "s", "setpoint": "A", "measured": "A"},
+    "current": {"time": "s", "setpoint": "A", "measured": "A", "heard": "s"},
     "field": {"time": "s", "field": "T"},
     "temperature": {"time": "s", "temperature": "K"},
     "voltages": {
@@ -64,14 +64,31 @@ def tables(run: Run, selection: Selection) -> dict[str, ExportTable]:
     """
     found = {}
     for name, units in UNITS.items():
-        rows = selection.of(getattr(run, name))
+        table = dated_current(run) if name == "current" else getattr(run, name)
+        rows = selection.of(table)
         columns = {column: _plain(rows[column]) for column in units}
         if name == "current" and "force" in derivable(run):
-            columns["force"] = derivation(run, "force")(rows["time"])
+            columns["force"] = derivation(run, "force")(rows["heard"])
             units = units | {"force": "N"}
         found[name] = ExportTable(columns, units)
     found["trials"] = _trials(run)
     return {name: table for name, table in found.items() if len(table)}
+
+
+def dated_current(run: Run) -> NDArray[Any]:
+    """The applied current by when the source acted: `UNITS` has the columns.
+
+    `heard` is when the host knew of it. Both are one where the source was only read
+    back, for a point of a list, and in runs of former versions.
+    """
+    rows = run.current
+    names = rows.dtype.names or ()
+    found = np.empty(rows.size, [(name, "f8") for name in UNITS["current"]])
+    found["setpoint"], found["measured"] = rows["setpoint"], rows["measured"]
+    found["heard"] = found["time"] = rows["time"]
+    if "acted" in names:
+        found["time"] = np.fmin(rows["time"], rows["acted"])
+    return found
 
 
 def _trials(run: Run) -> ExportTable:

@@ -14,6 +14,7 @@ from tactile_lab.signals import SIGNALS
 from tactile_lab.store.derived import DERIVED, derivation
 from tactile_lab.store.export.content import (
     about,
+    dated_current,
     tables,
 )
 from tactile_lab.store.export.library import library
@@ -202,12 +203,13 @@ def _times(time: FloatArray) -> dict[str, Any]:
 
 def _add_readings(pynwb: Any, session: Any, run: Run, selection: Selection) -> None:
     """Applied current as stimulus, field readings as acquisition."""
-    current, field = selection.of(run.current), selection.of(run.field)
+    current, field = selection.of(dated_current(run)), selection.of(run.field)
     if current.size:
         session.add_stimulus(
             pynwb.TimeSeries(
                 name="applied_current",
-                description="set-points sent to the coil's current source",
+                description="set-points of the coil's current source, by when it "
+                "acted on them",
                 data=current["setpoint"],
                 timestamps=current["time"],
                 unit="amperes",
