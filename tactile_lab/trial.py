@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 Probes = Literal["circuit", "ground", "supply"]
 """What the probes of the circuit's voltages touch: their nodes, 0 V, or V_S."""
 
+BASELINE = 0.1
+"""Time at rest that is recorded before the first trial and after each recovery, s."""
+
 ROUNDING = 1e-9
 """Time by which a hold may outlast its trial, s."""
 

@@ -153,15 +153,18 @@ class CoilWire(SourceWire[CoilDialect]):
         text = UNKNOWN + gathered(trouble)
         return OffReport(False, current, text, tuple(fall))
 
-    def _taken_over(self) -> float:
+    def _taken_over(self, fall: list[Lowered]) -> float:
         """Set-point to ramp down from, A, once a list that may be playing ended."""
         if self.dialect.list is None:
             return self.standing()
         # a wrong digit is set next; of two looks at what moves the smaller harms least
         flowing = min(self.current(), self.current(), key=abs)
+        sent = self.link.now
         self.set_current(flowing)
-        for line in self.dialect.stop_lines:
+        for line in self.dialect.stop_lines:  # the last ends it
+            sent = self.link.now
             self.command(line)
+        fall.append(Lowered(sent, self.link.now, self.acted, flowing))
         return flowing
 
     def _ramp_down(
@@ -183,7 +186,7 @@ class CoilWire(SourceWire[CoilDialect]):
         a hold the first step is taken at once.
         """
         try:
-            current = self._taken_over() if setpoint is None else setpoint
+            current = self._taken_over(fall) if setpoint is None else setpoint
             slew = max(slew, abs(current) / LONGEST_RAMP)
             answered = self.link.now - (0.0 if setpoint is None else rested)
             while True:

@@ -251,7 +251,7 @@ class Account:
             self.edges.extend(found)
 
     def note_list(
-        self, played: PlayedList, shunt: Trace | None, lag: float, code: float
+        self, played: PlayedList, shunt: Trace | None, lag: float, code: float = 0.0
     ) -> None:
         """A list has been played: find it in the binned coil current, where there is.
 
@@ -273,6 +273,8 @@ class Account:
         else:
             self.write_current(seen.edge.sampled - self.axis(played.began) - lag)
             self.edges.append(seen.edge)
+            if not played.whole:
+                return
             sure = code / 2 / float(np.ptp(played.points.currents))
             if played.generated and abs(seen.scale - 1) > MOST_SCALED + sure:
                 self.warn(

@@ -152,7 +152,9 @@ def find_list(played: PlayedList, zero: float, shunt: Trace) -> SeenList | None:
         return None
     reach = played.latest - played.earliest + SEARCH
     shifts = np.arange(-reach, reach + COIL_LAG, SHIFT)
-    inside = shunt.cut(began - reach, began + points.duration + reach)
+    # what flowed after a list that was cut off, the list does not say
+    end = points.duration + (reach if played.whole else -reach)
+    inside = shunt.cut(began - reach, began + end)
     if inside.time.size < 3:
         return None
     shift, unlike = _best(points, began, inside, shifts)

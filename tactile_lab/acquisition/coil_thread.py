@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -86,12 +86,14 @@ class PlayedList:
         points: the list.
         earliest, latest: between which clock times it began, s.
         generated: whether the scope's generator plays it.
+        whole: whether it was played to its end.
     """
 
     points: CurrentList
     earliest: float
     latest: float
     generated: bool = False
+    whole: bool = True
 
     @property
     def began(self) -> float:
@@ -217,6 +219,16 @@ class CoilThread(InstrumentThread):
         self.list, self._generated = None, points
         self.clock.notify()
 
+    @property
+    def cut_off(self) -> PlayedList | None:
+        """Of a list that was ended while it played what flowed; None: there is none."""
+        whole = self._passed - 1  # the last point that began may not have lasted
+        if self.list is None or not self.plays_list or whole < 1:
+            return None
+        points = self.list.points
+        part = CurrentList(points.currents[:whole], points.dwells[:whole])
+        return replace(self.list, points=part, whole=False)
+
     def take_warnings(self) -> list[str]:
         """Warnings of the source since this was last asked."""
         new = list(self.coil.warnings[self._warned :])
@@ -241,10 +253,16 @@ class CoilThread(InstrumentThread):
 
     def make_safe_and_close(self) -> None:
         """Switch off, verify by read-back, close."""
+        ended = self.clock.now()
         if self.generator is not None and self.plays_list:
             self.generator.ramp_down(self.coil.beat)
-        asked, last = self.clock.now(), self.last
+        asked = self.clock.now()
         self.off = self.coil.safe_off()
+        if self.list is not None and self.plays_list:
+            if not self.list.generated and self.off.fall:
+                ended = self.off.fall[0].acted
+            self._pass(self.list, ended)
+        last = self.last
         if last is not None and abs(last.setpoint) > RESOLUTION:  # it fell from there
             for one in self.off.fall:
                 asked, acted = one.asked, one.acted
@@ -369,9 +387,9 @@ class CoilThread(InstrumentThread):
         self._passed, self._read = 0, began[0]
         self.clock.notify()
 
-    def _watch(self, played: PlayedList, now: float) -> None:
-        """Note the points that have passed, read back now and then, end the list."""
-        points, coil = played.points, self.coil
+    def _pass(self, played: PlayedList, now: float) -> None:
+        """Note the points that have passed."""
+        points = played.points
         passed = int(np.searchsorted(points.starts, now - played.latest, side="right"))
         for k in range(self._passed, passed):
             at, current = float(points.starts[k]), float(points.currents[k])
@@ -383,6 +401,11 @@ class CoilThread(InstrumentThread):
             self.last = point
             self._applied.append(point)
         self._passed = max(passed, self._passed)
+
+    def _watch(self, played: PlayedList, now: float) -> None:
+        """Note the points that have passed, read back now and then, end the list."""
+        coil = self.coil
+        self._pass(played, now)
         if now >= played.end:
             if played.generated:
                 cast("AnalogueCoil", coil).end_follow()

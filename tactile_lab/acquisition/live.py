@@ -49,6 +49,11 @@ class LiveBins:
         """Run time up to which there are bins, s; 0 before any."""
         return self._next_time
 
+    @property
+    def gapless(self) -> bool:
+        """Whether the scope streams without gaps."""
+        return self._gapless
+
     def begin(self, stream: Stream, start: float) -> None:
         """Start a segment whose first sample is at `start` s on the run's axis."""
         with self._lock:

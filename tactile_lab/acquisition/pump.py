@@ -198,11 +198,14 @@ class Pump:
                     min(until, self._clock.now() + PULSE),
                 )
 
-    def last_words(self, known: BaseException | None) -> list[BaseException]:
+    def last_words(
+        self, known: BaseException | None, dated: Callable[[], None]
+    ) -> list[BaseException]:
         """Store what the instruments still delivered while they were closed.
 
         Args:
             known: what ended the run, which is told elsewhere.
+            dated: lets what was stored tell when the last currents came.
 
         Returns:
             What failed in closing and was not known; it has been told.
@@ -214,6 +217,7 @@ class Pump:
             self._tell_left()
             self._take_blocks()
             self._account.readings(self._instruments)
+            dated()
             self._account.write_current()
             if self._instruments.scope is not None:
                 self._end_intake(self._instruments.scope)

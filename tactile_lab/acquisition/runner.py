@@ -40,11 +40,9 @@ from tactile_lab.errors import (
     TactileLabError,
 )
 from tactile_lab.scope import Stream
-from tactile_lab.trial import Outcome, Trial, playable
+from tactile_lab.trace import Trace
+from tactile_lab.trial import BASELINE, Outcome, Trial, playable
 from tactile_lab.waveform import Waveform
-
-BASELINE = 0.1
-"""Seconds of rest recorded before the first trial and after each recovery."""
 
 LATE = 0.75
 """Part of a hold after which a person's reading is taken to be made."""
@@ -132,7 +130,7 @@ class Runner:
                 off = self.instruments.close(self._pump.follow)
             ending = Ending(state, off, reason, failure, self._stop.signal)
             try:
-                last = self._pump.last_words(failure)
+                last = self._pump.last_words(failure, self._note_cut_off)
                 self.missing = _told(SamplesLostError, failure, *last)
                 self.surplus = _told(SurplusError, failure, *last)
                 self._account.state(state, reason or off.text)
@@ -415,16 +413,27 @@ class Runner:
 
     def _note_edges(self, start: float) -> None:
         """Let the trial, in the samples from `start` s on, tell where clocks lie."""
-        shunt = None
-        if "coil_current" in self._live.signals and not self._record:
-            shunt = self._live.between(
-                start - BASELINE, self.intake.reached, "coil_current"
-            )
+        shunt = self._shunt(start)
+        if shunt is not None:
             self._account.note_edges(shunt)
         coil = self.instruments.coil
         if coil is not None and coil.list is not None:
             code = self._codes().get("coil_current", 0.0)
             self._account.note_list(coil.list, shunt, self._program.coil_lag, code)
+
+    def _note_cut_off(self) -> None:
+        """Let the samples tell when a list began that the end of the run cut off."""
+        coil = self.instruments.coil
+        played = None if coil is None else coil.cut_off
+        if played is not None:
+            shunt = self._shunt(self._account.axis(played.earliest))
+            self._account.note_list(played, shunt, self._program.coil_lag)
+
+    def _shunt(self, start: float) -> Trace | None:
+        """The coil current in the samples from before `start` s on; None without."""
+        if "coil_current" not in self._live.signals or not self._live.gapless:
+            return None
+        return self._live.between(start - BASELINE, self.intake.reached, "coil_current")
 
 
 def _told(kind: type[InstrumentError], *failures: BaseException | None) -> str | None:

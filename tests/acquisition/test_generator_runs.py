@@ -15,6 +15,7 @@ from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan
 from tactile_lab.planning.ways import ways_used
 from tactile_lab.scene.load import load
+from tactile_lab.store.applied import BY_SAMPLES
 
 WAVE = (
     'protocol.levels=["190 mN", "190 mN"]',
@@ -88,8 +89,11 @@ def in_the_hold(execution, event):
 
 def test_stop_takes_the_current_back_at_the_slew_limit(run_scene, bench, voltages):
     scene = load("demo", bench=bench)
-    ended = run_scene(*WAVE, scene=scene, watch=in_the_hold).done
-    assert ended.state is RunState.ABORTED and ended.off.verified
+    ran = run_scene(*WAVE, scene=scene, watch=in_the_hold)
+    assert ran.done.state is RunState.ABORTED and ran.done.off.verified
+    with ran.stored() as run:  # the samples date what was played until then
+        assert set(run.current["listed"]) == {0, BY_SAMPLES}
+    assert ran.lateness() == pytest.approx([0.0], abs=2e-3)
     time, volts = np.array(voltages).T
     assert volts.max() > 1.8 and volts[-1] == 0
     falls = (time > time[np.argmax(volts)]) & (volts < 1.75)

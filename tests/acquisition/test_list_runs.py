@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from sim_backend.coil.list_mode import ListFault
-from tactile_lab.acquisition.events import RunState, TrialStarted
+from tactile_lab.acquisition.events import CoilCurrent, RunState, TrialStarted
+from tactile_lab.store.applied import BY_SAMPLES
 
 LIST = (
     'protocol.levels=["200 mN", "200 mN"]',
@@ -82,10 +83,18 @@ def test_a_list_whose_current_nothing_measures_is_said_to_be_as_asked_for(
     assert "timed by the shunt" in told(ran.stored())[0]
 
 
-def test_stop_in_the_middle_of_a_list_ramps_down(run_scene):
+def test_a_list_that_is_stopped_on_its_way_up_is_dated_by_the_samples(run_scene):
+    """By the host it was up to 40 ms off, and its report named a misfit."""
+
     def watch(execution, event):
-        if isinstance(event, TrialStarted):
+        if isinstance(event, CoilCurrent) and event.setpoint > 0.6:
             execution.stop("enough")
 
-    ended = run_scene(*LIST, watch=watch).done
-    assert ended.state is RunState.ABORTED and ended.off.verified
+    ran = run_scene(*LIST, watch=watch)
+    assert ran.done.state is RunState.ABORTED and ran.done.off.verified
+    with ran.stored() as run:
+        listed = run.current[run.current["listed"] > 0]
+        assert set(listed["listed"]) == {BY_SAMPLES}
+        assert listed["setpoint"][-1] > 0.6
+        assert run.applied.uncertainty() is not None
+    assert ran.lateness() == pytest.approx([0.0], abs=2e-3)
