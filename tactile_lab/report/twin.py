@@ -66,6 +66,9 @@ def with_twin(run: RunData) -> tuple[RunData, BesideModel | None]:
     if not voltages and not run.searched:
         return run, None
     pauses = [(t.start, t.start + t.duration) for t in run.trials if t.pause]
+    # what fires as the force falls after a run was stopped belongs to no trial
+    ended = max((t.start + t.duration for t in run.trials), default=run.duration)
+    pauses.append((ended, run.duration))
     found = twin(
         believed.circuit,
         believed.force,

@@ -228,6 +228,7 @@ def test_a_trial_that_was_cut_short_is_reported_with_all_its_spikes(run_scene, s
     drawn = next(p for p in findings.plots if p.name == "figure")
     ticks = [s for p in drawn.panels for s in p.series if s.mark == "ticks"]
     assert sum(np.size(s.x) for s in ticks) == trial.response.spikes
+    assert findings.beside.twin.spikes.missed == 0, "those are no trial's either"
     fell = ran.done.spikes - trial.response.spikes
     told = [text for text in findings.run.warnings if "as the force fell" in text]
     assert bool(told) == bool(fell) and all(str(fell) in text for text in told)
