@@ -8,8 +8,8 @@ them opens an instrument, except `run` with a bench file of yours.
     >>> import tactile_lab
     >>> changes = {"protocol.levels": [0.12, "160 mN"], "protocol.rest": 0.5}
     >>> plan = tactile_lab.plan("demo", changes)
-    >>> plan.estimate.trials, plan.estimate.duration
-    (2, 6.0)
+    >>> plan.estimate.trials, round(plan.estimate.duration, 1)
+    (2, 6.3)
     >>> run = tactile_lab.run(plan.scene)
     >>> run
     <Run of demo: complete, simulated, 6.306 s, 2 trials, 32 spikes; V_C1, ...>

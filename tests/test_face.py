@@ -197,7 +197,7 @@ def test_the_latest_run_is_found_and_runs_are_listed(run, tmp_path):
 
 def test_plan_and_report_show_themselves(run):
     plan = tactile_lab.plan("demo", SHORT)
-    assert repr(plan) == "<Plan of demo: 3 s, 1 trial, 0 warnings>"
+    assert repr(plan) == "<Plan of demo: 3.305 s, 1 trial, 0 warnings>"
     assert "coil source" in plan._repr_html_() and "REAL" not in plan._repr_html_()
     report = tactile_lab.write_report(run)
     assert report.html.parent == run.path

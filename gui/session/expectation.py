@@ -9,6 +9,7 @@ import numpy as np
 
 from gui.lanes.expected import Preview, Stretch
 from tactile_lab.engine.request import Request
+from tactile_lab.trial import BASELINE
 
 if TYPE_CHECKING:
     # loading these takes a second: the window is on screen before
@@ -71,8 +72,6 @@ def expect(scene: Scene) -> Expectation:
 
 def _preview(made: Plan) -> Preview:
     """The plan's own prediction on the run's axis, which starts a baseline earlier."""
-    from tactile_lab.acquisition.runner import BASELINE
-
     drive, result = made.timeline, made.preview
     length = drive.duration + BASELINE
     holds = [Stretch.of(step.trial, step.start + BASELINE) for step in drive.steps]

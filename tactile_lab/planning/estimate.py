@@ -27,6 +27,9 @@ PYRAMID = 6 / 512
 REWRITTEN = 0.5
 """Time whose samples are written again, s, where streaming stops and goes on: chunks of
 0.25 s that were not full (measured: 140 kB a channel at 1 MS/s)."""
+SWITCHED_ON = 4.5
+"""Intervals between two set-points that it takes to switch the coil on as samples are
+taken already (measured: 4.5 of a Kepco)."""
 CODES = 127
 """Steps of an 8-bit converter from 0 to full scale."""
 
@@ -36,7 +39,7 @@ class Cost:
     """What running a scene takes; SI units.
 
     Attributes:
-        duration: of the experiment, s.
+        duration: of the experiment, s, from the first sample on.
         streamed: part of it during which samples are taken, s.
         trials: how many.
         samples_per_channel: taken of each enabled channel.
@@ -80,7 +83,9 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
         interval = coil_capability(coil).update_interval
     limits = CoilLimits() if coil is None else coil.limits
     left, heat, _ = heat_along(current, limits)
-    samples = round(drive.streamed * scene.record.sample_rate)
+    before = drive.rests + (0.0 if interval is None else SWITCHED_ON * interval)
+    streamed = drive.streamed + before
+    samples = round(streamed * scene.record.sample_rate)
     if not needed.channels:
         samples = 0
     stored = samples * len(needed.stored)
@@ -90,8 +95,8 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
     most = REPORT[1] + PYRAMID * stored + breaks * again / COMPRESSION
     step = 0.0 if interval is None else largest_step(current, interval)
     return Cost(
-        duration=drive.duration,
-        streamed=drive.streamed,
+        duration=drive.duration + before,
+        streamed=streamed,
         trials=len(drive.steps),
         samples_per_channel=samples,
         samples_stored=stored,

@@ -19,7 +19,7 @@ from tactile_lab.planning.outcome import ModelAlong, ModelOutcome, Step, joined
 from tactile_lab.planning.way import drive_for
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
-from tactile_lab.trial import Outcome, Trial, Trials, playable
+from tactile_lab.trial import BASELINE, Outcome, Probes, Trial, Trials, playable
 from tactile_lab.waveform import Waveform
 
 MOST_TRIALS = 10_000
@@ -34,6 +34,7 @@ class Timeline:
         steps: in order.
         force: of the whole run, N against s from 0.
         duration: s, planned pauses included.
+        rests: time at rest that a run samples besides its trials, s.
         warnings: where the coil cannot follow.
         adaptive: the protocol looked at what the sensor did, so that another sensor
             may get other trials.
@@ -43,13 +44,14 @@ class Timeline:
     steps: tuple[Step, ...]
     force: Waveform
     duration: float
+    rests: float
     warnings: tuple[str, ...]
     adaptive: bool
     spikes: int
 
     @property
     def streamed(self) -> float:
-        """Time during which samples are taken, s: all but planned pauses."""
+        """Time of trials during which samples are taken, s: all but planned pauses."""
         return sum(step.trial.length for step in self.steps if not step.trial.pause)
 
     def streams_at(self, time: FloatArray) -> NDArray[np.bool_]:
@@ -145,6 +147,8 @@ class _Driver:
         self._outcomes: list[ModelOutcome] = []
         self._limited: list[tuple[str, str]] = []
         self._time = 0.0
+        self._rests = BASELINE
+        self._probes: Probes = "circuit"
         self._amperes = 0.0
         self._field = (0.0, 0.0)
         self._heat = 0.0
@@ -170,15 +174,25 @@ class _Driver:
         step = Step(trial, self._time, force, current, drive, self._voltages)
         self.steps.append(step)
         self._time += length
+        self._rest_beside(trial)
         outcome = ModelOutcome(self.model, len(self.steps) - 1)
         self._outcomes.append(outcome)
         return outcome
+
+    def _rest_beside(self, trial: Trial) -> None:
+        """The rest that is sampled after a pause, and where probes were moved."""
+        if trial.pause:
+            self._rests += BASELINE
+        elif trial.probes != self._probes:
+            self._probes = trial.probes
+            self._rests += 2 * BASELINE
 
     def _wait_for_load(self, drive: Drive) -> None:
         """The time that a list takes to load goes by, unless it is there already."""
         if drive.points is not None and not drive.points.same_as(self._loaded):
             self._loaded = drive.points
             self._time += drive.load
+            self._rests += 2 * BASELINE
 
     def _played(self, trial: Trial) -> Drive:
         """How the coil plays the trial."""
@@ -215,6 +229,7 @@ class _Driver:
             tuple(self.steps),
             force,
             self._time,
+            self._rests,
             tuple(self._told()),
             any(outcome.looked_at for outcome in self._outcomes),
             sum(outcome.fired for outcome in self._outcomes),

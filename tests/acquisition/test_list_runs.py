@@ -46,6 +46,7 @@ def test_the_list_is_loaded_once_and_its_loading_is_a_planned_pause(ran):
     run = ran.stored()
     starts = [e.start for e in ran.told if isinstance(e, TrialStarted)]
     assert starts[0] > 3.0  # 401 points at 19200 baud
+    assert run.trials["end"][-1] == pytest.approx(run.info["planned_s"], abs=0.1)
     assert starts[1] - starts[0] < 1.6  # played again as it is
     assert ran.done.loss == {"samples": 0, "spikes": 0}
     assert run.current["listed"].sum() > 700

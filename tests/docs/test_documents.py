@@ -90,7 +90,7 @@ def test_the_scene_of_the_how_to_is_one(tmp_path, tactile_lab):
 
 SCRIPTING = "how-to/script-in-python.md"
 SAID = (
-    r"0\.12 N: \d+ spikes in runs", r"12\.5 s, 0\.\d+ A",
+    r"0\.12 N: \d+ spikes in runs", r"12\.8 s, 0\.90 A",
     r"<Run of hold_10s: complete", r"V_C1 +I_DS +rate", r"^\d+ \d\.\d+e-\d+",
     r"^tau ", r"V_C1 ",
 )  # fmt: skip

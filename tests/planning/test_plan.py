@@ -30,9 +30,10 @@ def test_the_demo_needs_four_channels_and_no_teslameter():
     assert not planned.needs.field_meter
     assert "teslameter" in left_out(planned)
     cost = planned.estimate
-    assert (cost.duration, cost.trials) == (18.0, 4)
-    assert cost.samples_per_channel == 18_000_000
-    assert cost.disk_raw == 18_000_000 * 4 * 2
+    # 0.1 s of rest, and the time to switch the coil on, come before the trials' 18 s
+    assert (cost.duration, cost.trials) == (pytest.approx(18.3, abs=0.02), 4)
+    assert cost.samples_per_channel == round(cost.duration * 1e6)
+    assert cost.disk_raw == cost.samples_per_channel * 4 * 2
     assert cost.peak_current == pytest.approx(0.997, abs=1e-3)
     assert 0 < cost.heat < cost.heat_budget == 30.0
     assert 15 < 1 / cost.update_interval < 40
@@ -388,7 +389,8 @@ def test_what_a_run_computes_is_the_sum_of_its_parts_and_each_can_be_left_out():
     assert saved["model beside the run"].seconds == pytest.approx(left)
     signals = [s for s in whole.scene.record.signals if s != "V_C2"]
     without = plan(load(None, [f"record.signals={json.dumps(signals)}"]))
-    assert saved["V_C2"].disk == whole.estimate.disk - without.estimate.disk
+    left = whole.estimate.disk - without.estimate.disk
+    assert saved["V_C2"].disk == pytest.approx(left, abs=1)
     left = cost.seconds - without.computing.seconds
     assert saved["V_C2"].seconds == pytest.approx(left)
     assert without.computing.memory < cost.memory

@@ -49,7 +49,7 @@ def test_the_plan_says_so_and_counts_the_time_to_load():
     assert way["lags_N"] == pytest.approx(0.8e-3)
     assert "and by 800 µN as lags are not known better" in told
     assert planned.timeline.loading == pytest.approx(way["load_s"])
-    assert planned.estimate.duration == pytest.approx(1.6 + way["load_s"])
+    assert planned.timeline.duration == pytest.approx(1.6 + way["load_s"])
 
 
 def test_a_way_that_cannot_be_gone_is_refused_with_its_reason(tmp_path):
