@@ -186,8 +186,12 @@ def _mean(
     *,
     sampled: bool,
 ) -> Series:
-    """Mean of everything but the first axis; its 95 % interval where it is a sample."""
-    rows = column.reshape(at.size, -1)
+    """Mean of everything but the first axis; its 95 % interval where it is a sample.
+
+    By rising values, whatever their order in the file.
+    """
+    rising = np.argsort(at, kind="stable")
+    at, rows = at[rising], column.reshape(at.size, -1)[rising]
     mean, error = _known_mean(rows), None
     known = np.isfinite(rows)
     size = known.sum(axis=1)
@@ -204,7 +208,7 @@ def _mean(
         name=name,
         mark="joined",
         colour=COLOURS[number % len(COLOURS)],
-        of=tuple(points.reshape(at.size, -1)[:, 0].tolist()),
+        of=tuple(points.reshape(at.size, -1)[rising, 0].tolist()),
     )
 
 

@@ -135,7 +135,7 @@ def test_bars_stand_where_something_was_drawn_and_not_over_a_grid(
     grid = [
         {"key": f"sensor.{key}", "values": [f"{at} {unit}" for at in values]}
         for key, values, unit in (
-            ("V_GS", (1.38, 1.4), "V"),
+            ("V_GS", (1.4, 1.38), "V"),
             ("C1", (200, 220), "pF"),
             ("R2", (1, 2), "MOhm"),
         )
@@ -146,7 +146,12 @@ def test_bars_stand_where_something_was_drawn_and_not_over_a_grid(
         found = carry_out(load_study(asked, f"bars {bars}"), tmp_path, count=1)
         first = next(p for p in plots(found) if p.name.startswith("response"))
         assert ("95 %" in first.caption) is bars
-        assert (first.panels[0].series[0].y_error is not None) is bars
+        curve = first.panels[0].series[0]
+        assert (curve.y_error is not None) is bars
+        # a line through values in another order would go back over itself
+        assert list(curve.x) == [1.38, 1.4]
+        values = found.study.design.values(np.array(curve.of))
+        assert [value[0] for value in values] == [1.38, 1.4]
 
 
 def test_from_the_command_line_to_a_page(tmp_path: Path) -> None:
