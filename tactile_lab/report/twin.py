@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, cast
@@ -10,18 +11,22 @@ import numpy as np
 
 from tactile_lab.analysis.belief import Belief
 from tactile_lab.analysis.error_budget import ErrorBudget, budget_line
+from tactile_lab.analysis.noise import noise
 from tactile_lab.analysis.spike_pairs import Matched
 from tactile_lab.analysis.suspects import Explanation, explain
 from tactile_lab.analysis.twin import Measured, Residual, Twin, twin
 from tactile_lab.analysis.twin_budget import V_C1_budget, spike_time_budget
 from tactile_lab.arrays import FloatArray
+from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import Measurement, RecordedSignal
 from tactile_lab.model.temperature import temperature
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
-from tactile_lab.quantity import printed, rounded
+from tactile_lab.quantity import printed, rounded, show
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.splice import ClosedTime
 
+HUMS = 0.3
+"""Part of V_C1's residual from which hum is told: less explains nothing of it."""
 CHANGED = 0.5
 """A temperature that is read to change by less is one temperature, K."""
 
@@ -178,6 +183,7 @@ def sentences(beside: BesideModel, run: Measurement) -> tuple[str, ...]:
             f"95 % of the time; {100 * residual.within:.0f} % lie within their "
             f"tolerance, {_ranging(known * 1e3, 'mV')}{shifted}."
         )
+    said += _humming(found.residual("V_C1"))
     if found.spikes is not None:
         text = f"Spikes: {found.spikes.sentence}"
         if np.isfinite(found.spikes.within):
@@ -188,6 +194,30 @@ def sentences(beside: BesideModel, run: Measurement) -> tuple[str, ...]:
             )
         said.append(f"{text}.")
     return tuple(said)
+
+
+def _humming(node_a: Residual | None) -> list[str]:
+    """What the mains put into V_C1, where it is a good part of its residual.
+
+    Bins of a longer run than half a minute are too wide to show it.
+    """
+    if node_a is None or node_a.time.size < 2:
+        return []
+    steps = np.diff(node_a.time)
+    step = float(np.median(steps))
+    gaps = np.flatnonzero(np.abs(steps - step) > step / 2) + 1
+    longest = max(np.split(node_a.difference, gaps), key=len)
+    try:
+        found = noise(longest, step)
+    except NotIdentifiableError:
+        return []
+    return [
+        f"V_C1 carries {show(math.sqrt(2) * line.rms / np.sinc(at * step), 'V', 2)} of "
+        f"hum of the mains, {at:g} Hz (amplitude), none of the causes that are "
+        "tried. `tactile-lab run wiring_check` measures it channel by channel."
+        for line in found.lines
+        if (at := line.frequency) == line.mains and line.rms > HUMS * found.rms
+    ]
 
 
 def _ranging(tolerance: FloatArray, unit: str) -> str:

@@ -196,6 +196,11 @@ def test_a_shunt_under_hum_is_told(tmp_path):
     """Latencies were known to 45 ms, and nothing said why."""
     humming = {**SHORT, "record.sample_rate": 20e3, "simulated.hum": 0.02}
     humming["record.signals"] = ("coil_current", "V_C1")
-    run = Execution(load(None, humming), tmp_path).run().folder
-    (told,) = [line for line in read(run).warnings if "hum or noise" in line]
+    run = read(Execution(load(None, humming), tmp_path).run().folder)
+    (told,) = [line for line in run.warnings if "hum or noise" in line]
     assert "steps of the coil current" in told
+    # in V_C1 it is no misfit of the sensor's
+    beside = find(run).beside
+    assert beside.explanation is None or beside.explanation.cause is None
+    (told,) = [line for line in sentences(beside, run) if "of the mains" in line]
+    assert told.startswith("V_C1 carries 20 mV of hum of the mains, 50 Hz")
