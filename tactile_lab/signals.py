@@ -15,7 +15,8 @@ class Signal:
     Attributes:
         name: as written in scenes and files.
         unit: SI.
-        source: where a run gets it from; `simulate` computes all but bench signals.
+        source: where a run gets it from, which has none that are of the model;
+            `simulate` computes all but bench signals.
         title: for axes and legends.
     """
 
@@ -45,6 +46,9 @@ SIGNALS = {
 
 BENCH_ONLY = frozenset({"coil_current", "field", "temperature"})
 """Signals the model alone knows nothing of."""
+
+MODEL_ONLY = frozenset(n for n, signal in SIGNALS.items() if signal.source == "model")
+"""Signals that no instrument has: `simulate` gives them, and no run."""
 
 AVERAGED = ("field", "temperature")
 """Kept as readings, one for many samples, where a scope channel carries them."""

@@ -21,7 +21,7 @@ from tactile_lab.planning.ranges import Extremes, expected, fitted, widened
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scope import Channel
-from tactile_lab.signals import AVERAGED, SIGNALS
+from tactile_lab.signals import AVERAGED
 from tactile_lab.voltage_source import why_not
 
 SAMPLED = ("V_C1", "V_C2", "V_K", "coil_current")
@@ -42,8 +42,6 @@ class Needs:
         stored: signals of those that are stored sample by sample.
         detect_on: signal spikes are detected on ("V_K", or "V_C2" by its resets where
             no V_K is wired); None where no spikes are asked for.
-        model: recorded signals that no instrument measures: computed from the applied
-            current and labelled "model".
         guaranteed_rate: streaming rate the scope's maker guarantees for so many
             channels, S/s; infinite where it is not known.
         gapless: whether the scope streams without gaps; true without a scope.
@@ -59,7 +57,6 @@ class Needs:
     channels: tuple[Channel, ...]
     stored: tuple[str, ...]
     detect_on: str | None
-    model: tuple[str, ...]
     guaranteed_rate: float
     gapless: bool = True
     expected: Extremes = field(default_factory=dict)
@@ -119,11 +116,6 @@ def needs(scene: Scene, drive: Timeline | None = None) -> Needs:
             or (name == "V_C1" and "I_DS" in recorded and derives_I_DS)
         ),
         detect_on=detect_on,
-        model=tuple(
-            name
-            for name in scene.record.signals
-            if SIGNALS[name].source == "model" and name not in wired
-        ),
         guaranteed_rate=rate,
         gapless=gapless,
         expected=seen,

@@ -9,7 +9,7 @@ from tactile_lab.planning.warn import threshold_of
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import AUTO
-from tactile_lab.signals import AVERAGED, FIELD_AVERAGING, SIGNALS
+from tactile_lab.signals import AVERAGED, FIELD_AVERAGING, MODEL_ONLY, SIGNALS
 from tactile_lab.voltage_source import VoltageLimits
 
 NOT_RECORDED = "field is not recorded, so it is not compared with the current"
@@ -58,11 +58,7 @@ def uses(scene: Scene, needed: Needs) -> Reasons:
             )
         )
     for name in scene.record.signals:
-        if name in needed.model:
-            found.append(
-                (name, "model, from the applied current; no instrument has it")
-            )
-        elif name == "force":
+        if name == "force":
             found.append((name, "derived from the applied current and the magnet"))
         elif name == "spikes":
             found.append((name, f"detected on {needed.detect_on} as it streams"))
@@ -114,6 +110,8 @@ def leaves_out(scene: Scene, needed: Needs, drive: Timeline) -> Reasons:
     for name in SIGNALS:
         if name not in scene.record.signals and name not in enabled:
             found.append((name, "not recorded"))
+        elif name in MODEL_ONLY:
+            found.append((name, "exists only in the model"))
     if any(step.trial.pause for step in drive.steps):
         found.append(("samples of pauses", "recovery is neither streamed nor stored"))
     if not compared(scene, needed):

@@ -19,6 +19,7 @@ from tactile_lab.planning.ways import ways_used
 from tactile_lab.quantity import bytes_text, rounded, show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import Simulated
+from tactile_lab.signals import MODEL_ONLY
 from tactile_lab.spikes.detection import DEVIATIONS
 
 SAMPLES_PER_DECAY = 6
@@ -40,6 +41,7 @@ def warnings(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]:
     """What a person should change, or know, before a run; no scene has one for good."""
     return (
         *drive.warnings,
+        *_model_only(scene),
         *_ways(scene, drive),
         *_spike_sampling(scene, needed),
         *_noise(scene, needed, drive.streamed),
@@ -49,6 +51,15 @@ def warnings(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]:
         *(() if scene.bench.simulated else _magnet(scene)),
         *_exchanged(scene, needed),
     )
+
+
+def _model_only(scene: Scene) -> Iterator[str]:
+    for name in scene.record.signals:
+        if name in MODEL_ONLY:
+            yield (
+                f"{name} exists only in the model; a run leaves it out. "
+                "`tactile-lab simulate` gives it."
+            )
 
 
 def _ways(scene: Scene, drive: Timeline) -> Iterator[str]:

@@ -88,8 +88,15 @@ def test_field_only_computes_nothing_of_the_model():
 def test_drain_current_is_derived_from_v_c1():
     needed = needs(load(None, ['record.signals=["I_DS"]']))
     assert needed.stored == ("V_C1",)
-    assert needed.model == ()
-    assert needs(load(None, ['record.signals=["V_P", "I_C"]'])).model == ("V_P", "I_C")
+
+
+def test_what_no_instrument_has_is_left_out_and_that_is_said():
+    """V_P was told as needed, and no run ever held it."""
+    planned = plan(load(None, ['record.signals=["V_P", "V_C1"]']), preview=False)
+    assert "V_P" in left_out(planned)
+    assert "V_P" not in {what for what, _ in planned.uses}
+    (said,) = [text for text in planned.warnings if "V_P" in text]
+    assert said.startswith("V_P exists only in the model; a run leaves it out")
 
 
 def warned(*overrides):
