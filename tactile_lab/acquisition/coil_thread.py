@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Protocol, cast
 
 import numpy as np
 
@@ -106,6 +106,16 @@ class PlayedList:
         return self.latest + self.points.duration
 
 
+class Warmth(Protocol):
+    """Keeps how warm the coil is; either call may raise to leave it off."""
+
+    def refuse_found(self, settings: Mapping[str, str]) -> None:
+        """Its source was opened, made safe, and has these settings."""
+
+    def begin(self) -> None:
+        """It is about to be switched on."""
+
+
 class CoilThread(InstrumentThread):
     """Owns the current source.
 
@@ -119,7 +129,7 @@ class CoilThread(InstrumentThread):
         clock: the bench's time.
         stop: asks for the end.
         lease: ends it where nobody renews that.
-        before_on: called before it is switched on; may raise to prevent it.
+        heat: is told as it is opened and switched on; None where nobody keeps it.
 
     Attributes:
         switched_on: the source was told to switch on and not yet off again; until
@@ -142,7 +152,7 @@ class CoilThread(InstrumentThread):
         clock: Clock,
         stop: StopRequest,
         lease: Lease,
-        before_on: Callable[[], None] = lambda: None,
+        heat: Warmth | None = None,
     ) -> None:
         super().__init__("coil", clock)
         self.coil = coil
@@ -154,7 +164,7 @@ class CoilThread(InstrumentThread):
         self.measured: float | None = None
         self._stop = stop
         self._lease = lease
-        self._before_on = before_on
+        self._heat = heat
         self._applied: deque[Applied] = deque()
         self._warned = 0
         self._read = float("-inf")
@@ -244,6 +254,8 @@ class CoilThread(InstrumentThread):
         self.coil.heed(self._is_halted)
         self.coil.open()
         self.settings = {"identity": self.coil.identity, **self.coil.settings()}
+        if self._heat is not None:
+            self._heat.refuse_found(self.settings)
 
     def work(self) -> None:
         """Play what is asked for until told to leave, to stop, or left alone."""
@@ -288,7 +300,8 @@ class CoilThread(InstrumentThread):
         self.coil.beat()
         self._lease.check()
         if self._energise:
-            self._before_on()
+            if self._heat is not None:
+                self._heat.begin()
             self.switched_on = True  # before it is: its answers may come late
             self.coil.energise()
             self.settings.update(self.coil.settings())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from tactile_lab.acquisition.coil_thread import CoilThread
+from tactile_lab.acquisition.coil_thread import CoilThread, Warmth
 from tactile_lab.acquisition.generator_player import GeneratorPlayer
 from tactile_lab.acquisition.instrument_thread import InstrumentThread
 from tactile_lab.acquisition.meter_thread import (
@@ -48,15 +48,12 @@ class Instruments:
         bench: Bench,
         stop: StopRequest,
         lease: Lease,
-        before_on: Callable[[], None],
+        heat: Warmth | None,
     ) -> Instruments:
-        """Threads for what the bench has; none started, nothing opened.
-
-        `before_on` is called before the coil is switched on.
-        """
+        """Threads for what the bench has; none started, nothing opened."""
         clock, coil = bench.clock, None
         if bench.coil is not None:
-            coil = CoilThread(bench.coil, clock, stop, lease, before_on)
+            coil = CoilThread(bench.coil, clock, stop, lease, heat)
         scope = ScopeThread(bench.scope, clock) if bench.scope else None
         if coil is not None and scope is not None and bench.generator is not None:
             slew = coil.coil.limits.slew

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from tactile_lab.acquisition.asked_field import AskedField
+from tactile_lab.acquisition.coil_thread import Warmth
 from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.drive_check import DriveCheck
 from tactile_lab.acquisition.person import Ask
@@ -40,7 +41,7 @@ class Program:
         drift: judges V_C1 at rest before each trial; None where no trial pushes.
         drive_check: compares current, shunt and field of each trial; None where
             nothing drives the coil.
-        before_on: called before the coil is switched on; may raise to prevent it.
+        heat: keeps how warm the coil is; None where nobody does.
         asked_field: has a person read the field; None where a meter does, or nobody.
     """
 
@@ -57,6 +58,6 @@ class Program:
     coil_lag: float = 0.0
     drift: Drift | None = None
     drive_check: DriveCheck | None = None
-    before_on: Callable[[], None] = lambda: None
+    heat: Warmth | None = None
     ask: Ask | None = None
     asked_field: AskedField | None = None

@@ -87,7 +87,7 @@ class Runner:
         self._account = Account(bench.clock, journal, emit)
         self._stop = stop
         self._lease = Lease(bench.clock)
-        self.instruments = Instruments.of(bench, stop, self._lease, program.before_on)
+        self.instruments = Instruments.of(bench, stop, self._lease, program.heat)
         self._pump = Pump(
             program,
             bench.clock,

@@ -313,7 +313,7 @@ class Execution(Task[Executed]):
             coil_lag=scene.bench.magnet.coil_lag,
             drift=self._drift(),
             drive_check=self._drive_check(),
-            before_on=self._heat.begin if self._heat else lambda: None,
+            heat=self._heat,
             ask=self._ask,
             asked_field=self._asked_field if needed.asked_field else None,
         )
@@ -352,8 +352,6 @@ class Execution(Task[Executed]):
         return DriveCheck(field, calibrated=used is not None and used.unit == "T")
 
     def _doubts(self, settings: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
-        if self._heat is not None:
-            self._heat.refuse_found(settings.get("coil", {}))
         scope = settings.get("scope", {})
         found = tuple(one["moved"] for one in settings.values() if "moved" in one)
         if others := scope.get("others"):

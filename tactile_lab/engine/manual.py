@@ -82,7 +82,7 @@ class ManualControl(Task[Ending]):
             self.bench.clock,
             self.stop,
             self._lease,
-            self._begins,
+            self._heat,
         )
         self._energised = False
 
@@ -124,17 +124,6 @@ class ManualControl(Task[Ending]):
         except LimitError as reason:
             return Ending.refused(str(reason))
 
-    def _begins(self) -> None:
-        """It is about to be switched on.
-
-        Raises:
-            LimitError: much flowed through it when its source was opened, or how warm
-                it gets cannot be kept.
-        """
-        if self._heat is not None:
-            self._heat.refuse_found(self.thread.settings)
-            self._heat.begin()
-
     def _left_warm(self, heat: CoilHeat, ending: Ending) -> float:
         """Time until the coil counts as cold, s."""
         limits, end = self._limits, self._since(self.bench.clock.now())
@@ -147,7 +136,6 @@ class ManualControl(Task[Ending]):
 
     def _followed(self) -> Ending:
         coil, told = self.thread, False
-        hot: LimitError | None = None
         self._lease.renew()
         coil.start()
         over = False
@@ -155,20 +143,13 @@ class ManualControl(Task[Ending]):
             over = coil.join(EVERY)
             if coil.opened and not told:
                 told = True
-                try:
-                    if self._heat is not None:
-                        self._heat.refuse_found(coil.settings)
-                except LimitError as reason:
-                    hot = reason
-                    self.stop(str(reason))
-                    continue
                 self._emit(events.StateChanged(events.RunState.READY, "source opened"))
             for one in coil.take_applied():
                 self._emit(events.CoilCurrent(one.time, one.setpoint, one.measured))
                 if self._steps[-1][1] != one.setpoint:
                     self._steps.append((self._since(one.time), one.setpoint))
         off = coil.off or OffReport(False, None, "The coil's thread said nothing.")
-        if (failure := coil.failure or hot) is not None:
+        if (failure := coil.failure) is not None:
             return Ending(events.RunState.FAULTED, off, str(failure), failure)
         return Ending(
             events.RunState.ABORTED, off, self.stop.reason, signal=self.stop.signal

@@ -442,6 +442,25 @@ def test_a_coil_found_on_beyond_its_continuous_current_cools_first(
     assert heat_of(source).left() > LONGEST - 60.0
 
 
+def test_a_coil_found_hot_cools_though_its_run_was_stopped_at_once(
+    source: Source, tmp_path: Path
+):
+    """What flowed was forgotten with the run, and the next pressed at once."""
+
+    def heard(event: Event) -> None:
+        if isinstance(event, StateChanged) and event.state is RunState.CONNECTING:
+            one.stop("another scene was meant")
+
+    source.bench.write_text(source.bench.read_text().replace('"1 s"', '"600 s"'))
+    set_by_hand(source, b"CURR 0.3\nOUTP 1\n")
+    one = Execution(
+        load("demo", SHORT, str(source.bench)), tmp_path / "runs", emit=heard
+    )
+    done = one.run()
+    assert done.state is RunState.ABORTED and done.off.verified
+    assert heat_of(source).left() > LONGEST - 60.0
+
+
 def test_a_coil_found_hot_is_not_driven_by_hand(source: Source):
     """A warning was told, and as much could be set at once."""
     source.bench.write_text(source.bench.read_text().replace('"1 s"', '"600 s"'))
