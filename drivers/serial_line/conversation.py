@@ -31,6 +31,9 @@ EXCHANGED = 5.0
 TRIES = 3
 """Attempts to have an instrument say its name when it is opened."""
 
+ROUNDED = 1e-3
+"""Part by which a number that is read back may differ from the one that was set."""
+
 MOST_ERRORS = 25
 """Answers of an error queue to read before giving up on emptying it."""
 
@@ -276,8 +279,16 @@ class Conversation(Generic[D]):
         return [
             f"{line} answers {answer!r}"
             for line, answer in asked.items()
-            if re.search(self.dialect.confirm[line], answer) is None
+            if not self._is_as_wanted(answer, self.dialect.confirm[line])
         ]
+
+    def _is_as_wanted(self, answer: str, wanted: str | tuple[float, ...]) -> bool:
+        if isinstance(wanted, str):
+            return re.search(wanted, answer) is not None
+        value = self.parsed(answer)
+        return value is not None and any(
+            math.isclose(value, one, rel_tol=ROUNDED) for one in wanted
+        )
 
     def _empty_errors(self, ask: Callable[[str], str]) -> list[str]:
         """Read the error queue until it is empty; what it held."""

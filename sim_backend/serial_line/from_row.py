@@ -54,7 +54,10 @@ class RowParser:
         name, fine = invented(row.match), invented(row.error_ok)
         self._answers = {row.identify: lambda: name} | answers
         for query, wanted in row.confirm.items():
-            self._answers[query] = partial(invented, wanted)
+            if isinstance(wanted, str):
+                self._answers[query] = partial(invented, wanted)
+            else:
+                self._answers[query] = partial(invented, row.number, f"{wanted[0]:g}")
         if row.error is not None:
             self._answers[row.error] = lambda: errors.popleft() if errors else fine
         self._accepted = {*row.init, *row.optional, *row.release}

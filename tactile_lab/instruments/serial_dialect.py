@@ -44,7 +44,20 @@ def _with_group(text: str) -> str:
     return text
 
 
+def _wanted(value: object) -> object:
+    """A pattern, or the numbers of which one is wanted."""
+    if isinstance(value, str):
+        return _pattern(value)
+    numbers = value if isinstance(value, list | tuple) else [value]
+    if not numbers or any(type(one) not in (int, float) for one in numbers):
+        raise ValueError("a pattern is needed, a number, or an array of numbers")
+    return tuple(map(float, numbers))
+
+
 Pattern = Annotated[str, AfterValidator(_pattern)]
+
+Wanted = Annotated[str | tuple[float, ...], BeforeValidator(_wanted)]
+"""What an answer must be: a pattern it matches, or one of some numbers."""
 
 Picking = Annotated[str, AfterValidator(_with_group)]
 """A pattern whose group 1 is what is wanted of an answer."""
@@ -190,8 +203,8 @@ class SerialDialect(Dialect):
         serial: settings and framing of the wire.
         identify: harmless query of its name.
         init: lines after identification.
-        confirm: queries after `init`, and the pattern that each answer must match: a
-            line may have been lost.
+        confirm: queries after `init`, and the number that each answer must be, one of
+            some, or the pattern it must match: a line may have been lost.
         optional: lines before `init` whose refusal is accepted.
         release: lines before the port is closed.
         error: query of the error queue; None where there is none.
@@ -204,7 +217,7 @@ class SerialDialect(Dialect):
     identify: Line = "*IDN?"
     optional: Lines = ()
     init: Lines = ()
-    confirm: dict[Line, Pattern] = Field(default={})
+    confirm: dict[Line, Wanted] = Field(default={})
     release: Lines = ()
     error: Line | None = None
     error_ok: Pattern = r"^[+-]?0\b"

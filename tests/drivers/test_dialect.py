@@ -9,7 +9,7 @@ from sim_backend.coil.source import MODELS, SimCoilSource
 from sim_backend.serial_line.wires import plug_in
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
-from tactile_lab.errors import LimitError, SceneError
+from tactile_lab.errors import BadReplyError, LimitError, SceneError
 from tactile_lab.instruments.dialects import (
     coil_dialect,
     dialect_ids,
@@ -201,6 +201,11 @@ def test_a_dialects_file_bears_its_id(name):
             "voltage_match = 'V=.*'\n[confirm]",
             'voltage_match = "V=.*": it picks',
         ),
+        (
+            "'(?i)^\\+?(1|CURR)'",
+            "true",
+            "[confirm] FUNC:MODE? = true: a pattern is needed, a number, or an array",
+        ),
     ],
 )
 def test_a_mistake_is_told_with_file_key_and_what_is_allowed(old, new, told):
@@ -209,6 +214,38 @@ def test_a_mistake_is_told_with_file_key_and_what_is_allowed(old, new, told):
         parse_dialect(text_of().replace(old, new), "mine.toml")
     assert told in str(refused.value)
     assert "http" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("query", "answer", "taken"),
+    [
+        (":SENS:VOLT:RANG?", "21.00000", True),
+        (":SENS:VOLT:RANG?", "+2.100000E+01", True),
+        (":SENS:VOLT:RANG?", "2.1", False),
+        (":SENS:VOLT:RANG?", "210", False),
+        (":SOUR:CURR:RANG?", "1.050000", True),
+        (":SENS:CURR:NPLC?", "1.000000E-01", True),
+        (":SENS:CURR:NPLC?", "1.00", False),
+    ],
+)
+def test_what_is_read_back_as_a_number_is_compared_as_one(
+    resistor, query, answer, taken
+):
+    """A range of 21 V that was answered as 21.00000 was refused."""
+    clock = SimulatedClock()
+    row = coil_dialect("keithley-2400")
+    source = SimCoilSource(resistor, row.id, clock)
+    heard, asked = source.line, query.encode()
+    source.line = lambda line: answer.encode() if line == asked else heard(line)
+    end = plug_in(source, row.serial, clock, "coil")
+    coil = CoilSource(row, end.url, CoilLimits(current=0.5), clock)
+    with clock.taking_part("test"):
+        if taken:
+            coil.open()
+        else:
+            with pytest.raises(BadReplyError, match=f"settings: .*{answer!r}"):
+                coil.open()
+        coil.close()
 
 
 @pytest.mark.parametrize("name", dialect_ids())
