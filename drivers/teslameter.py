@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from drivers.serial_line.meter import SerialMeter
+from drivers.serial_line.meter import SerialMeter, unit_of
 from tactile_lab.bench import Reading
 from tactile_lab.errors import BadReplyError, LimitError
 from tactile_lab.instruments.meter_dialect import MULTIPLIERS, TeslameterDialect
@@ -13,9 +13,6 @@ from tactile_lab.quantity import show
 
 MOST_READINGS = 4
 """Readings to take until two in a row have one multiplier."""
-
-UNIT = re.compile(r"[\d.]\s*([A-Za-z]+)\s*$")
-"""What stands behind the number of an answer."""
 
 UNITS = {"t": 1.0, "mt": 1e-3, "ut": 1e-6, "g": 1e-4, "kg": 0.1, "mg": 1e-7}
 """Tesla of each unit that a meter may write there, in lower case."""
@@ -68,8 +65,7 @@ class Teslameter(SerialMeter[TeslameterDialect]):
         Raises:
             BadReplyError: it is another.
         """
-        shown = UNIT.search(answer)
-        tesla = None if shown is None else UNITS.get(shown[1].lower())
+        tesla = UNITS.get(unit_of(answer) or "")
         if tesla is not None and not math.isclose(tesla, self.dialect.scale):
             raise BadReplyError(
                 f"The teslameter answers {answer!r} where its dialect "

@@ -180,7 +180,13 @@ class Conversation(Generic[D]):
             raise NoReplyError(told) from reason
 
     def number(self, line: str, pattern: str | None = None) -> float:
-        """The numeric answer to `line`: group 1 of `pattern`, or of the row's.
+        """The numeric answer to `line`; see `number_in`."""
+        return self.number_in(line, pattern)[0]
+
+    def number_in(self, line: str, pattern: str | None = None) -> tuple[float, str]:
+        """The number in the answer to `line`, and that answer.
+
+        The number is group 1 of `pattern`, or of the row's.
 
         Raises:
             BadReplyError: no finite number, twice.
@@ -197,7 +203,7 @@ class Conversation(Generic[D]):
                 f'{line!r}, twice: no number in its dialect "{self.dialect.id}". Look '
                 "at its display, and compare the dialect with its manual."
             )
-        return value
+        return value, answer
 
     def command(self, line: str) -> None:
         """Send a line that changes state and check that it was taken.

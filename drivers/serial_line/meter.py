@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import ClassVar, TypeVar
 
 from drivers.serial_line.conversation import Conversation
@@ -11,6 +12,15 @@ from tactile_lab.clock import Clock
 from tactile_lab.instruments.meter_dialect import MeterDialect
 
 M = TypeVar("M", bound=MeterDialect)
+
+UNIT = re.compile(r"[\d.]\s*([A-Za-z]+)\s*$")
+"""What stands behind the number of an answer."""
+
+
+def unit_of(answer: str) -> str | None:
+    """The unit behind the number of an answer, in lower case; None without one."""
+    shown = UNIT.search(answer)
+    return None if shown is None else shown[1].lower()
 
 
 class SerialMeter(SerialInstrument[Conversation[M]]):

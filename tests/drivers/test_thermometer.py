@@ -137,6 +137,33 @@ def test_a_row_of_ones_own_in_celsius_at_another_input():
         bench.it.close()
 
 
+@pytest.mark.parametrize(
+    ("answer", "kelvin"),
+    [
+        ("21.3", 294.45),
+        ("21.3 C", 294.45),
+        ("+21.3degC", 294.45),
+        ("294.1 K", 294.1),
+        ("77.0 F", 298.15),
+        ("-4F", 253.15),
+        ("21.3 mV", None),
+    ],
+)
+def test_a_unit_behind_the_number_is_heeded(answer, kelvin):
+    """77 F were kept as 77 C."""
+    bench = Bench(parse_dialect(OWN, "bath.toml").at("1"))
+    heard = bench.far.line
+    bench.far.line = lambda line: answer.encode() if line == b"T1?" else heard(line)
+    with bench.clock.taking_part("test"):
+        bench.it.open()
+        if kelvin is None:
+            with pytest.raises(BadReplyError, match=f"'{answer}'.* none of K, C and F"):
+                bench.it.read()
+        else:
+            assert bench.it.read().value == pytest.approx(kelvin)
+        bench.it.close()
+
+
 def test_mistakes_in_a_row_are_told():
     with pytest.raises(
         SceneError, match=r'temperature = "T\{chan\}\?": .*is \{input\}'
