@@ -137,6 +137,8 @@ class SerialLink:
             self._send_preamble()
             answer = self._ask_name()
             self._has_said_its_name()
+            if answer != self.identity:
+                self._ask_again(answer)
         except BaseException:
             self.close()
             raise
@@ -279,6 +281,19 @@ class SerialLink:
                     raise NoReplyError(
                         failures.silence(self.what, self.port, asked, name, patience)
                     ) from reason
+
+    def _ask_again(self, name: str) -> None:
+        """Have it say a name that was not known twice: a digit may be wrong in one.
+
+        Raises:
+            BadReplyError: it says another.
+        """
+        if (again := self._ask_name()) != name:
+            raise BadReplyError(
+                f"The {self.what} at {self.port} answers {self._identify} with "
+                f"{name!r} and then with {again!r}. Check baud rate and cable."
+            )
+        self._names_due = 0
 
     def _has_said_its_name(self) -> None:
         """Let no second answer come later, where it was asked more than once."""

@@ -61,5 +61,5 @@ def test_no_line_begins_too_soon_after_the_one_before(model, monkeypatch):
         line.query("UNIT?")
         line.write("AUTO 1")
     rests = [b[0] - a[1] for a, b in itertools.pairwise(port.spans)]
-    assert len(rests) == 5
+    assert len(rests) == 6
     assert min(rests) >= {"421": 0.05}.get(model, 0.03)

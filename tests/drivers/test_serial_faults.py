@@ -253,6 +253,28 @@ def test_unplugged_and_back_is_made_safe_not_resumed(serial_bench, form):
     assert it.plant.coil_current(0) == 0.0
 
 
+def test_a_wrong_digit_in_its_name_is_not_kept(serial_bench):
+    """After a lost answer the right name was a stranger's: the coil stayed unknown."""
+    it, said = serial_bench, []
+    heard = it.source.line
+
+    def line(words):
+        answer = heard(words)
+        if words == b"*IDN?":
+            said.append(answer if said else answer.replace(b"E123456", b"E123466"))
+            return said[-1]
+        return answer
+
+    it.source.line = line
+    it.coil.open()
+    it.coil.energise()
+    it.drive(0.5)
+    it.end.faults.add(SerialFault(kind="missing"))
+    it.drive(0.7)
+    assert it.coil.safe_off().verified
+    assert b"E123466" in said[0] and "E123456" in it.coil.identity
+
+
 def test_an_error_of_the_instrument_is_passed_on(serial_bench):
     it = serial_bench
     it.coil.open()
@@ -330,7 +352,7 @@ def test_a_row_with_echo_reads_past_it(serial_bench, join):
     assert coil.safe_off().verified
     coil.close()
     # nothing was taken for a stranger's answer, after which its name is asked again
-    assert sent.count(b"*IDN?\n") == 1
+    assert sent.count(b"*IDN?\n") == 2
 
 
 def test_another_instrument_on_the_port_is_refused(serial_bench):
