@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -356,8 +357,10 @@ class Recorder:
             self._failed = True
             self._look_for_it(error)
             kept = min((column.written for column in self._columns), default=0)
+            number = error.errno if isinstance(error, OSError) else None
+            why = os.strerror(number) if number else str(error)
             raise RecordingError(
-                f"{self.folder.path / DATA} cannot be written: {error}. The first "
+                f"{self.folder.path / DATA} cannot be written: {why}. The first "
                 f"{kept} samples per channel are kept; free space on the disk or "
                 "choose another folder with --out, and run `tactile-lab recover` on "
                 "this run."
