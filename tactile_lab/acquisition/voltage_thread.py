@@ -65,10 +65,12 @@ class VoltageThread(InstrumentThread):
             if wanted is not None and wanted == self._reached:
                 self._readings.append(self.source.read())
             elif wanted is not None and not self._stop.requested:
-                due = began + STEP_EVERY
                 if self.source.step_to(wanted):
                     self._reached = wanted
                     self.clock.notify()
+                answered = self.clock.now()
+                # a step is as large as the time since the answer before it allows
+                due = max(began + STEP_EVERY, answered + (answered - began))
             self._rest_until(due, wanted)
 
     def make_safe_and_close(self) -> None:

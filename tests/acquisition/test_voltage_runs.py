@@ -13,6 +13,8 @@ from sim_backend.serial_line import wires
 from sim_backend.serial_line.faults import SerialFault
 from sim_backend.voltage_source import LoadFault
 from tactile_lab.acquisition.events import RunState, StateChanged, VoltageRead
+from tactile_lab.acquisition.stop import StopRequest
+from tactile_lab.acquisition.voltage_thread import VoltageThread
 from tactile_lab.engine.execution import Execution
 from tactile_lab.engine.jobs import InstrumentAnswer, check
 from tactile_lab.engine.request import bench_request
@@ -218,6 +220,23 @@ def test_one_lost_answer_does_not_cost_the_run(scene, execute):
     fault = SerialFault(kind="missing", line="READ", skip=2)
     done = execute(scene(*HELD), fault)
     assert done.state is RunState.COMPLETE, done.reason
+
+
+def test_a_source_that_answers_slowly_gets_to_its_voltage(scene):
+    """With 50 ms to an answer each step was 0 V, and a run waited for it for ever."""
+    held = scene(*HELD)
+    slow = SerialFault(kind="late", line="SOUR:VOLT ", amount=0.05, times=None)
+    bench = open_bench(held, needs(held), voltage_faults=(slow,))
+    clock, ((name, source),) = bench.clock, bench.voltage_sources.items()
+    thread = VoltageThread(name, source, clock, StopRequest(clock))
+    with clock.taking_part("test"):
+        thread.start()
+        thread.hold(1.4)
+        clock.wait_for(lambda: thread.stands, clock.now() + 10.0)
+        assert thread.stands
+        thread.leave()
+        clock.wait_for(lambda: thread.ended)
+    assert thread.left is not None and thread.left.verified
 
 
 def test_a_stop_while_it_ramps_takes_it_to_rest(scene, tmp_path):
