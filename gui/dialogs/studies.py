@@ -175,7 +175,7 @@ class StudiesCard(Overlay):
             figure.picked.connect(self._pick)
             figure.tell = self._told
             self.figures.append(figure)
-            self._rows.insertWidget(1 + len(self.figures), figure)
+            self._rows.insertWidget(len(self.figures), figure)
         for figure, plot in zip(self.figures, plots, strict=False):
             figure.show_plot(plot)
             figure.setMaximumHeight(figure.minimumHeight())
@@ -225,7 +225,7 @@ def _html_row(cells: Sequence[str]) -> str:
     sides[0] = sides[-1] = "left"
     return "".join(
         f'<td align="{side}" style="padding:3px 18px 3px 0">'
-        f"{escape(cell, quote=False)}</td>"
+        f"{escape(cell.replace('Ohm', 'Ω'), quote=False)}</td>"
         for side, cell in zip(sides, cells, strict=True)
     )
 

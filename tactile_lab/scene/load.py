@@ -13,7 +13,7 @@ from typing import Any
 from tactile_lab import trust
 from tactile_lab.columns import read_text
 from tactile_lab.complaint import Blame, complaint, validated, written
-from tactile_lab.errors import SceneError, choices, nearest
+from tactile_lab.errors import SceneError, choices, nearest, to_type
 from tactile_lab.plugins import (
     protocol_class,
     protocol_from_file,
@@ -35,6 +35,8 @@ TABLES = (
     "protocol", "bench", "sensor", "record", "detect", "coil", "simulated",
     "conditions",
 )  # fmt: skip
+OTHERS = {"want": "design", "axis": "study", "array": "skin"}
+"""Tables that no scene has, and the verbs that take files with them."""
 DEMO = "demo"
 SIMULATED = "sim"
 """Name of the built-in simulated bench."""
@@ -89,6 +91,12 @@ def load(
             data = {"protocol": {"name": name, "source": file.name}}
         else:
             data = read_toml(file, "Scene")
+            for table, verb in OTHERS.items():
+                if table in data:
+                    raise SceneError(
+                        f"{file} is no scene, which has no [{table}]: it is for "
+                        f"`{to_type(verb, file)}`."
+                    )
             trust.check(data, file.parent)
     origins = {}
     if bench is None and scene is not None and "bench" not in data:

@@ -48,6 +48,9 @@ def test_figures_come_with_the_points_and_stay(lab, tmp_path: Path) -> None:
     assert "18 points of demo" in card.text.text()
     names = [one.plot.name for one in card.figures if one.plot is not None]
     assert names == ["map", "response_0", "response_1"]
+    card._rows.activate()
+    assert card.tables.y() > card.figures[-1].y(), "they stay where they came"
+    assert "MΩ" in card.tables.text() and "Ohm" not in card.tables.text()
     assert card.page.isEnabled()
     first = card.points.itemText(0)
     room = card.points.maximumWidth() - 40

@@ -47,6 +47,21 @@ def test_a_shipped_scene_is_found_by_its_name():
     assert load("spikes_only").record.signals == ("spikes",)
 
 
+@pytest.mark.parametrize(
+    ("text", "verb"),
+    [
+        ('title = "A"\n[want.threshold]\nis = "20 mN"\n', "design"),
+        ('title = "A"\n[[axis]]\nkey = "sensor.R1"\n', "study"),
+        ("[array]\ngrid = [2, 1]\n", "skin"),
+    ],
+)
+def test_a_file_of_another_verb_is_told_as_that(scene_file, text, verb):
+    """The window said that a scene has no key "title"."""
+    path = scene_file(text)
+    with pytest.raises(SceneError, match=f"is no scene.*`tactile-lab {verb} {path}`"):
+        load(path)
+
+
 def test_tables_become_si(scene_file):
     path = scene_file(
         PULSES
