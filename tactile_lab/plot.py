@@ -294,6 +294,15 @@ def grid(series: Series) -> tuple[FloatArray, FloatArray, FloatArray]:
     return _edges(x), _edges(y), z
 
 
+def with_room(places: Sequence[float], least: float) -> list[int]:
+    """Which of some places, ascending, lie so far apart that each can have a number."""
+    kept: list[int] = []
+    for number, place in enumerate(places):
+        if not kept or place - places[kept[-1]] >= least:
+            kept.append(number)
+    return kept
+
+
 def _edges(values: FloatArray) -> FloatArray:
     if values.size < 2:
         wide = np.abs(values) / 2 + (values == 0)

@@ -13,10 +13,13 @@ from PySide6.QtGui import QColor, QPen
 from gui.look.fonts import sized
 from gui.look.tokens import Tokens
 from gui.plots.numbers import decimals, number, value_ticks
+from tactile_lab.plot import with_room
 
 # at exit it would look through every object there is; the window closes its own
 pg.setConfigOption("exitCleanup", False)
 
+NAME = 44.0
+"""Least distance between two values that have a text, px."""
 AIR = 15
 """Pixels by which a number may stand out at an end of an axis."""
 
@@ -77,10 +80,14 @@ class RoundAxis(pg.AxisItem):  # type: ignore[misc]
         orientation: "left" or "bottom".
         apart: least distance between two numbers, px.
         whole: whether only whole numbers mean anything.
+
+    Attributes:
+        named: texts at values, ascending, in place of round ones; as many as have room.
     """
 
     def __init__(self, orientation: str, apart: float, *, whole: bool = False) -> None:
         self._apart, self._least = apart, 1.0 if whole else 0.0
+        self.named: dict[float, str] = {}
         super().__init__(orientation, maxTickLength=0)
         self.enableAutoSIPrefix(False)
         self.setStyle(tickFont=sized(11), tickAlpha=255)
@@ -102,6 +109,11 @@ class RoundAxis(pg.AxisItem):  # type: ignore[misc]
         Where less than three powers are in it, their multiples by 2 and 5, too, if
         there is room.
         """
+        if self.named:
+            inside = [value for value in self.named if low <= value <= high]
+            place = size / (high - low)
+            few = with_room([place * value for value in inside], NAME)
+            return [(1.0, [inside[number_] for number_ in few])]
         if self.logMode:
             tens = range(math.floor(low) - 1, math.ceil(high) + 1)
             roomy = math.log10(2) * size >= self._apart / 2 * (high - low)
@@ -121,6 +133,8 @@ class RoundAxis(pg.AxisItem):  # type: ignore[misc]
 
     def tickStrings(self, values: Any, scale: float, spacing: float) -> list[str]:
         """The numbers, with a true minus."""
+        if self.named:
+            return [self.named[value] for value in values]
         if self.logMode:
             return [_power(value) for value in values]
         return [number(value, decimals(spacing)) for value in values]

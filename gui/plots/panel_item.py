@@ -30,6 +30,9 @@ WIDEST = 1e4
 """Width of a heading where nothing limits it, px."""
 SIZE = 7.6
 """Size of a point, px."""
+BELOW = 1e-9
+"""Part of a value to which the bar of an interval goes that reaches 0, which is nowhere
+on a logarithmic axis."""
 REACH = 10.0
 """Distance from a point within which a click is on it, px."""
 
@@ -107,9 +110,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         bottom.setHeight(foot)
         if foot >= FOOT:
             bottom.setLabel(_rich(x_text), color=tokens.muted, **{"font-size": "11px"})
-        named = [(float(self._x(x)), f"{x * x_by:.3g}") for x in plot.x_ticks]
-        if named:
-            bottom.setTicks([named])
+        bottom.named = {float(self._x(x)): f"{x * x_by:.3g}" for x in plot.x_ticks}
         self.box.whole = [self._x_range(), self._y_range()]
         self.box.show_all()
         for guide in panel.guides:
@@ -146,7 +147,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
             return [float(self._x(limit)) for limit in plot.x_limits]
         panels = (self._panel,) if plot.beside else plot.panels
         drawn = [s for p in panels for s in p.series]
-        across = [self._x(grid(s)[0] if s.mark == "cells" else s.x) for s in drawn]
+        across = [self._x(v) for s in drawn for v in _along_x(s)]
         if any(s.mark == "cells" for s in drawn):  # no air about a map
             return [float(np.min(across[0])), float(np.max(across[0]))]
         upright = (g for p in panels for g in p.guides if g.along == "y")
@@ -163,7 +164,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         shown = [
             self._y(v)
             for s in panel.series
-            for v in (s.y, s.low, s.high)
+            for v in (s.y, s.low, s.high, *_reached(s.y, s.y_error))
             if v is not None and s.mark != "ticks"
         ]
         across = (g for g in panel.guides if g.along == "x")
@@ -298,14 +299,14 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
     def _errors(self, s: Series, colour: str) -> None:
         """Bars of the 95 % intervals."""
         sides: dict[str, FloatArray] = {}
-        for values, half, shown, ends in (
-            (s.x, s.x_error, self._x, ("left", "right")),
-            (s.y, s.y_error, self._y, ("bottom", "top")),
+        for values, half, shown, log, ends in (
+            (s.x, s.x_error, self._x, self._plot.x_log, ("left", "right")),
+            (s.y, s.y_error, self._y, self._panel.log, ("bottom", "top")),
         ):
-            if half is not None:
-                low, high = (np.asarray(values) + k * np.asarray(half) for k in (-1, 1))
-                sides[ends[0]] = shown(values) - shown(low)
-                sides[ends[1]] = shown(high) - shown(values)
+            # one that reaches 0 leaves a logarithmic panel, and is not left out
+            least = BELOW * np.abs(values) if log else -np.inf
+            for end, reach in zip(ends, _reached(values, half), strict=False):
+                sides[end] = np.abs(shown(np.maximum(reach, least)) - shown(values))
         if sides:
             x, y = self._x(s.x), self._y(s.y)
             bars = pg.ErrorBarItem(x=x, y=y, pen=stroke(colour, self._ratio), **sides)
@@ -325,6 +326,19 @@ def _shown(by: float, log: bool) -> Callable[[ArrayLike], FloatArray]:
         return np.log10(np.where(found > 0, found, np.nan)) if log else found
 
     return shown
+
+
+def _reached(values: ArrayLike, half: ArrayLike | None) -> tuple[FloatArray, ...]:
+    """The lower and the upper ends of intervals; none where they have no width."""
+    if half is None:
+        return ()
+    middle, width = np.asarray(values, np.float64), np.asarray(half, np.float64)
+    return middle - width, middle + width
+
+
+def _along_x(s: Series) -> tuple[ArrayLike, ...]:
+    """What of a series is to be in view along x."""
+    return (grid(s)[0],) if s.mark == "cells" else (s.x, *_reached(s.x, s.x_error))
 
 
 def _ends(guide: Guide) -> tuple[float, ...]:

@@ -21,7 +21,16 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocato
 from numpy.typing import ArrayLike
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.plot import Guide, Panel, Plot, Series, grid, y_scale, z_scale
+from tactile_lab.plot import (
+    Guide,
+    Panel,
+    Plot,
+    Series,
+    grid,
+    with_room,
+    y_scale,
+    z_scale,
+)
 from tactile_lab.report import palette
 from tactile_lab.report.palette import INK, MEASURED, PAPER, QUIET, RULE, SIMULATED
 from tactile_lab.whole_file import replacing, write_text
@@ -60,6 +69,8 @@ WIDTH = 7.2
 LEFT, RIGHT, FOOT, GAP = 0.72, 0.3, 0.5, 0.18
 BETWEEN = 0.75
 """Between panels side by side."""
+NUMBER = 0.45
+"""From one number along x to the next, where each stands at a value of its own."""
 HEAD_HEIGHT = 0.62
 """Room the heading takes at the top."""
 HEADING = "heading"
@@ -161,7 +172,7 @@ def _x_axis(axes: Axes, plot: Plot, factor: float) -> None:
     if plot.x_log:
         _log_x(axes)
     if plot.x_ticks:
-        at = [factor * x for x in plot.x_ticks]
+        at = _roomy(axes, [factor * x for x in plot.x_ticks])
         axes.set_xticks(at, [f"{x:.3g}" for x in at])
         axes.minorticks_off()
     elif plot.whole:
@@ -172,6 +183,13 @@ def _x_axis(axes: Axes, plot: Plot, factor: float) -> None:
     first, last = plot.x_limits or (0.0, 0.0)
     if first < last:  # a run may have ended at once
         axes.set_xlim(factor * first, factor * last)
+
+
+def _roomy(axes: Axes, values: list[float]) -> list[float]:
+    """Of values along x, ascending, as many as have room for their numbers."""
+    axes.get_xlim()  # else it is not known yet how far they lie apart
+    places = axes.transData.transform([(value, 1.0) for value in values])[:, 0]
+    return [values[n] for n in with_room((places / DPI).tolist(), NUMBER)]
 
 
 def _log_x(axes: Axes) -> None:

@@ -113,6 +113,45 @@ def test_one_value_but_for_rounding_has_an_axis_that_can_be_read(app) -> None:
     assert 10 < right - left < 30 and left < 160 < right
 
 
+def test_the_ends_of_intervals_are_in_view(app) -> None:
+    """Of a phase of −100° ± 40° the bar ended at −120°, where its panel did."""
+    view, low = SmallPlot(Theme("light")), Series(x=[1.0, 9.0], y=[-100.0, -90.0])
+    phase = replace(low, y_error=[40.0, 1.0], x_error=[0.5, 6.0], mark="points")
+    gain = replace(phase, y=[2.0, 3.0], y_error=[2.5, 1.0], x_error=None)
+    panels = (
+        Panel(label="phase", series=(phase,)),
+        Panel(label="gain", series=(gain,), log=True),
+    )
+    view.show_plot(Plot(name="one", caption="", x_label="f", panels=panels))
+    (left, right), (bottom, top) = view.panels[0].box.whole
+    assert left < 0.5 and right > 15 and bottom < -140 and top > -60
+    (bars,) = (
+        i for i in view.panels[1].box.addedItems if isinstance(i, pg.ErrorBarItem)
+    )
+    ends = np.log10([2.0, 3.0]) - bars.opts["bottom"]
+    assert ends[0] < view.panels[1].box.whole[1][0] - 1, "it reaches 0, and is drawn so"
+    assert ends[1] == pytest.approx(np.log10(2.0))
+
+
+def test_no_number_of_an_axis_lies_over_another(app) -> None:
+    """Of 24 frequencies each had its number, and none could be read."""
+    at = np.geomspace(0.01, 0.8, 24)
+    panel = Panel(label="gain", series=(Series(x=at, y=at, mark="points"),))
+    plot = Plot(name="one", caption="", x_label="f", x_log=True, panels=(panel,))
+    few, many = (replace(plot, x_ticks=tuple(x)) for x in (at[::6], at))
+    view = SmallPlot(Theme("light"))
+    for plot in (few, many):
+        view.show_plot(plot)
+        (axis,) = (
+            i for i in view.panels[0].items if getattr(i, "orientation", "") == "bottom"
+        )
+        ((step, values),) = axis.tickValues(-2.1, 0.0, 250)
+        texts = axis.tickStrings(values, 1.0, step)
+        assert texts[0] == "0.01" and len(texts) >= 4
+        assert np.diff(values).min() * 250 / 2.1 > 44
+    assert len(texts) < 7
+
+
 def test_values_that_are_all_zero_have_an_axis_that_can_be_read(app) -> None:
     """No spike at any point of a study: its range was a nanohertz, without a number."""
     view = SmallPlot(Theme("light"))

@@ -34,6 +34,23 @@ def test_what_counts_has_whole_numbers_and_each_of_a_few():
     assert [y for y in scans.get_yticks() if low < y < high] == [1, 2, 3, 4, 5]
 
 
+@pytest.mark.parametrize(("count", "told"), [(5, 5), (24, 12)])
+def test_numbers_at_values_of_their_own_can_be_read(count, told):
+    """Of 24 frequencies each had its number, one over the other."""
+    at = np.geomspace(0.01, 0.8, count)
+    panel = Panel(label="Gain", series=(Series(x=at, y=at, mark="points"),))
+    plot = Plot(
+        name="x", caption="x.", x_label="Frequency", x_unit="Hz", x_prefix="",
+        x_log=True, x_ticks=tuple(at.tolist()), panels=(panel,),
+    )  # fmt: skip
+    labels = [
+        one for one in draw(plot, "x").axes[0].get_xticklabels() if one.get_text()
+    ]
+    assert len(labels) == told and labels[0].get_text() == "0.01"
+    boxes = [one.get_window_extent() for one in labels]
+    assert all(one.x1 < two.x0 for one, two in itertools.pairwise(boxes))
+
+
 def test_dollars_in_names_are_no_formula(tmp_path):
     odd = "a$b_{$ of V_C1"
     at = Series(x=[0.0, 1.0], y=[0.0, 1.0], mark="text", texts=(odd, odd))
