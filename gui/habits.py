@@ -28,6 +28,9 @@ class Habits(QObject):
     ) -> None:
         super().__init__(screen)
         self._session, self._wishes, self._screen = session, preferences, screen
+        self._rings = 0
+        self._bell = QTimer(self, singleShot=True)
+        self._bell.timeout.connect(self._ring)
         session.run.ended.connect(lambda done: self._sound(1))
         session.status.faulted.connect(lambda: self._sound(3))
         session.bench.ready.connect(self._watch)
@@ -44,9 +47,17 @@ class Habits(QObject):
         self._screen.list_runs()
 
     def _sound(self, times: int) -> None:
+        """Ring in a turn of its own: a run that a fault ends is no end beside it."""
         if self._wishes.wants("sound"):
-            for number in range(times):
-                QTimer.singleShot(number * APART, QApplication.beep)
+            self._rings = max(self._rings, times)
+            if not self._bell.isActive():
+                self._bell.start(0)
+
+    def _ring(self) -> None:
+        QApplication.beep()
+        self._rings -= 1
+        if self._rings:
+            self._bell.start(APART)
 
     def _watch(self) -> None:
         last = self._session.bench.choice

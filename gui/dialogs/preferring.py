@@ -6,7 +6,7 @@ from functools import partial
 from os.path import expanduser  # that of Path raises where nobody is so called
 from pathlib import Path
 
-from PySide6.QtWidgets import QCheckBox, QLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QApplication, QCheckBox, QLayout, QLineEdit, QWidget
 
 from gui.ask_file import ask_file
 from gui.dialogs.overlay import Overlay
@@ -30,7 +30,7 @@ from tactile_lab.errors import RunFolderError, TactileLabError
 from tactile_lab.scene.load import load_bench
 
 SWITCHES = {
-    "sound": "Sound at the end of a run, and three times at a fault",
+    "sound": "Ring the desktop's bell as a run ends, and three times at a fault",
     "monitor": "Watch the sensor as soon as a bench is ready (coil off)",
     "reports": "Write the report at the end of each run",
     "lsl": "Publish each run live to other programs (Lab Streaming Layer)",
@@ -49,6 +49,8 @@ class PreferencesCard(Overlay):
         self.folder = line_edit("Folder for runs", "runs")
         self.bench = line_edit("Bench at the start", "the last; sim, none, or a file")
         self.switches = {key: QCheckBox(words) for key, words in SWITCHES.items()}
+        # a desktop may keep its bell silent, and nothing else would tell
+        self.switches["sound"].clicked.connect(lambda on: on and QApplication.beep())
         self.problem = label("", "error", wrap=True)
         self.save = push("Save", "primary")
         self.close_button = push("Close")

@@ -1,6 +1,7 @@
 """The menu, what a user prefers, and what is at hand on a small screen."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QRect, QSettings, Qt
@@ -43,12 +44,18 @@ def test_preferences_are_kept_from_one_start_to_the_next(
     assert second.recent == [scene], "those that are still there"
 
 
-def test_settings_act_at_once(lab) -> None:
+def test_settings_act_at_once(lab, monkeypatch) -> None:
     window, session = lab.window, lab.session
     out = session.out
     window.actions_.show_preferences()
     card = window.findChild(PreferencesCard)
     assert card.isVisible()
+    rings: list[bool] = []
+    bell = SimpleNamespace(beep=lambda: rings.append(True))
+    monkeypatch.setattr("gui.dialogs.preferring.QApplication", bell)
+    for _ in range(2):
+        card.switches["sound"].click()
+    assert rings == [True], "as it is ticked: whether it can be heard"
     card.folder.setText(str(lab.folder / "elsewhere"))
     card.switches["reports"].setChecked(False)
     card.switches["lsl"].setChecked(True)

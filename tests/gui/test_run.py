@@ -4,6 +4,7 @@ import json
 import threading
 from dataclasses import replace
 from shutil import rmtree
+from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import Qt
@@ -225,11 +226,19 @@ def test_pauses_are_none_of_the_steps_that_results_wait_for(lab, monkeypatch) ->
     assert window.review.results.mark.text() == "preliminary · 0 of 3 steps"
 
 
-def test_unplugged_coil_becomes_a_fault_that_says_what_to_do(lab) -> None:
+def test_unplugged_coil_becomes_a_fault_that_says_what_to_do(lab, monkeypatch) -> None:
+    """The bell rings three times at it, where that is wanted, not a fourth time."""
     window, session = lab.window, lab.session
+    rings: list[str] = []
+    bell = SimpleNamespace(beep=lambda: rings.append(session.state.value))
+    monkeypatch.setattr("gui.habits.QApplication", bell)
+    monkeypatch.setattr("gui.habits.APART", 1)
+    monkeypatch.setattr(window.preferences, "wants", lambda switch: switch == "sound")
     lab.run()
     newest_coil().faults.add(SerialFault(kind="unplug", times=None))
     lab.until(lambda: session.state is WindowState.FAULT)
+    lab.until(lambda: len(rings) >= 3 and not window._habits._bell.isActive())
+    assert rings == 3 * [WindowState.FAULT.value]
     assert window.banner.isVisible()
     assert window.header.stop.truth is CoilKnowledge.UNKNOWN
     assert window.header.stop.words.title == "COIL STATE UNKNOWN"
