@@ -334,8 +334,8 @@ class Actions(QObject):
 
         start(work, "open skin", finishes=True)
 
-    def _show_skin(self, made: Callable[[Theme, QWidget], QWidget]) -> None:
-        window = made(self.panels.theme, self.window)
+    def _show_skin(self, made: Callable[[Theme, Panels], QWidget]) -> None:
+        window = made(self.panels.theme, self.panels)
         fit(window, self.window.screen().availableSize())
         window.show()
 

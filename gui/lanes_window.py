@@ -13,9 +13,9 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QWidget
 
 from gui.actions import Actions
-from gui.header.stop import StopButton
-from gui.parts import Elided, bar, column, panel
+from gui.parts import column
 from gui.screen.panels import Panels
+from gui.screen.stop_bar import StopBar
 from gui.tab_order import move_on
 from gui.within_reach import framed
 
@@ -51,16 +51,10 @@ class LanesWindow(QWidget):
         self.setAcceptDrops(True)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         panels.theme.dress(self)
-        self.stop = StopButton()
-        self.stop.clicked.connect(lambda: panels.session.stop())
-        panels.stops.append(self.stop)
-        self._title = Elided("", "hidentity")
-        head = panel("header")
-        head.setFixedHeight(panels.header.height())
-        bar(head, (16, 0, 14, 0), 11, (self._title, 1), self.stop)
-        centre = panels.centre
+        self._head = StopBar(panels)
+        self.stop, centre = self._head.stop, panels.centre
         self._splitter = centre.splitter.saveState()
-        column(self, head, (centre.lanes, 1), spacing=0)
+        column(self, self._head, (centre.lanes, 1), spacing=0)
         actions.bind(self)
         window.windowTitleChanged.connect(self._name)
         self._name(window.windowTitle())
@@ -79,12 +73,12 @@ class LanesWindow(QWidget):
 
     def _name(self, title: str) -> None:
         self.setWindowTitle(f"Lanes · {title}")
-        self._title.set_whole(self.windowTitle())
+        self._head.title.set_whole(self.windowTitle())
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Put the lanes back where they were."""
         panels = self._panels
-        panels.stops.remove(self.stop)
+        self._head.leave()
         panels.centre.splitter.insertWidget(0, panels.centre.lanes)
         panels.centre.splitter.restoreState(self._splitter)
         self.closed.emit()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as wall
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PySide6.QtCore import Qt, QTimer
@@ -12,7 +13,8 @@ from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import QProgressBar, QSlider, QSplitter, QWidget
 
 from gui.look.theme import Theme
-from gui.parts import Combo, Elided, IconButton, column, label, row, say
+from gui.parts import Combo, Elided, IconButton, Part, column, label, row, say
+from gui.screen.stop_bar import StopBar
 from gui.skin.computing import Failed, SkinComputation, TrainsFound
 from gui.skin.film import Dots, Film
 from gui.skin.views import MapView, Raster
@@ -22,6 +24,9 @@ from tactile_lab.skin.events import FILE, Events
 from tactile_lab.skin.layout import Array
 from tactile_lab.skin.skin import Skin, load_skin
 
+if TYPE_CHECKING:
+    from gui.screen.panels import Panels
+
 FRAME = 33
 """Time between two pictures, ms."""
 SPEEDS = {"1/100 speed": 0.01, "1/10 speed": 0.1, "real time": 1.0, "10 × faster": 10.0}
@@ -29,7 +34,7 @@ STEPS = 2000
 """Of the slider."""
 
 
-def open_skin(path: Path, out: Path) -> Callable[[Theme, QWidget | None], SkinWindow]:
+def open_skin(path: Path, out: Path) -> Callable[[Theme, Panels | None], SkinWindow]:
     """Read a skin file, which is computed then, or events on disk.
 
     Takes seconds, most of all the first time on a computer: for a thread of its own
@@ -40,7 +45,8 @@ def open_skin(path: Path, out: Path) -> Callable[[Theme, QWidget | None], SkinWi
         out: where the folder of a skin that is computed is put.
 
     Returns:
-        Makes the window on it, from a theme and whose window it goes with, if any.
+        Makes the window on it, from a theme and the panels of the main window it goes
+        with, if any.
 
     Raises:
         SceneError, ParameterError: the skin cannot be used as written.
@@ -60,15 +66,15 @@ def open_skin(path: Path, out: Path) -> Callable[[Theme, QWidget | None], SkinWi
         _, warnings = highest(skin)
         folder = out / skin.name
 
-    def made(theme: Theme, parent: QWidget | None) -> SkinWindow:
+    def made(theme: Theme, panels: Panels | None) -> SkinWindow:
         computing = SkinComputation(computed, folder)
-        return SkinWindow(skin, computing, theme, parent, warnings)
+        return SkinWindow(skin, computing, theme, panels, warnings)
 
     return made
 
 
 class SkinWindow(QWidget):
-    """Map and raster of one array.
+    """Map and raster of one array; with the bench window, whose STOP it may cover, one.
 
     Attributes:
         film: to be played; None while it is computed.
@@ -79,9 +85,10 @@ class SkinWindow(QWidget):
         skin: Skin,
         computing: SkinComputation,
         theme: Theme,
-        parent: QWidget | None = None,
+        panels: Panels | None = None,
         warnings: tuple[str, ...] = (),
     ) -> None:
+        parent = None if panels is None else panels.header.window()
         super().__init__(parent, Qt.WindowType.Window)
         self.setWindowTitle(f"{skin.title} · Tactile Lab")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -120,9 +127,14 @@ class SkinWindow(QWidget):
         both.addWidget(left)
         both.addWidget(self.raster)
         both.setSizes([520, 640])
+        self._head = None if panels is None else StopBar(panels, skin.title)
+        heads = () if self._head is None else (self._head,)
+        title: tuple[Part, ...] = () if heads else (label(skin.title, "big"), 12)
+        inner = QWidget()
+        column(self, *heads, (inner, 1), spacing=0)
         column(
-            self,
-            row(label(skin.title, "big"), 12, (label(about, "muted"), 1)),
+            inner,
+            row(*title, (label(about, "muted"), 1)),
             self.warning,
             (both, 1),
             self.progress,
@@ -164,6 +176,8 @@ class SkinWindow(QWidget):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Stop computing."""
+        if self._head is not None:
+            self._head.leave()
         self._timer.stop()
         self._computing.leave()
         super().closeEvent(event)

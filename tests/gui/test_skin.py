@@ -215,10 +215,15 @@ def test_stop_does_not_wait_while_a_skin_is_read(lab, folder, monkeypatch):
     monkeypatch.setattr("tactile_lab.skin.press.highest", noted)
     lab.window.actions_.open_skin(folder / "ball.toml")
     lab.until(lambda: lab.window.findChildren(SkinWindow))
+    stops = lab.window.panels.stops
     for window in lab.window.findChildren(SkinWindow):
         room = window.screen().availableSize()
         assert window.size().boundedTo(room) == window.size(), "no part off the screen"
+        (stop,) = (one for one in stops if one.window() is window)
+        assert stop.isVisible(), "the window may cover that of the main one"
+        lab.until(lambda stop=stop: stop.words == stops[0].words)
         window.close()
+    assert len(stops) == 1
     assert threads and threading.main_thread() not in threads
 
 
