@@ -28,30 +28,40 @@ class Buttons(QWidget):
         bar(self, (0, 0, 0, 0), 8, *parts)
         theme.changed.connect(self._tint)
         self._tint()
-        self.show_next(WindowState.DISCONNECTED, "", cannot_wait="")
+        self.show_next(WindowState.DISCONNECTED, "", cannot_wait="", planning="")
 
-    def show_next(self, state: WindowState, problem: str, *, cannot_wait: str) -> None:
+    def show_next(
+        self, state: WindowState, problem: str, *, cannot_wait: str, planning: str
+    ) -> None:
         """Offer the form's run.
 
         Args:
             state: of the window.
             problem: why it cannot start now, "" if it can.
             cannot_wait: why it cannot wait in the queue, "" if it can.
+            planning: for how long it is planned already, "" where it is not.
         """
         self._swap(editing=False)
         self.run.setEnabled(not problem)
-        self.run.setToolTip(problem or "Run what the form says (Ctrl+R)")
-        self.run.setText(WORDS.get(state, "Run"))
+        self.run.setToolTip(problem or _told("Run what the form says", "R", planning))
+        self.run.setText(WORDS.get(state) or planning or "Run")
         self.queue.setEnabled(not cannot_wait)
-        self.queue.setToolTip(cannot_wait or "Have it wait for its turn (Ctrl+Return)")
+        wait = _told("Have it wait for its turn", "Return", planning)
+        self.queue.setToolTip(cannot_wait or wait)
+        self.queue.setText(planning if planning and state in WORDS else "Queue")
 
-    def show_edit(self, problem: str) -> None:
-        """Offer to save the edited run; `problem` is why that cannot be done."""
+    def show_edit(self, problem: str, planning: str) -> None:
+        """Offer to save the edited run.
+
+        Args:
+            problem: why that cannot be done, "" if it can.
+            planning: for how long it is planned already, "" where it is not.
+        """
         self._swap(editing=True)
         self.save.setEnabled(not problem)
-        self.save.setToolTip(
-            problem or "Replace the queued run's parameters (Ctrl+Return)"
-        )
+        replace = _told("Replace the queued run's parameters", "Return", planning)
+        self.save.setToolTip(problem or replace)
+        self.save.setText(planning or "Save to queue")
 
     def _swap(self, *, editing: bool) -> None:
         for button in (self.run, self.queue):
@@ -65,3 +75,8 @@ class Buttons(QWidget):
         play.addPixmap(pixmap("play", tokens.faint), QIcon.Mode.Disabled)
         self.run.setIcon(play)
         self.queue.setIcon(icon("queue", tokens.text))
+
+
+def _told(act: str, key: str, planning: str) -> str:
+    """What a button does, and when, where the plan is still computed."""
+    return f"{act}{', once it is planned' if planning else ''} (Ctrl+{key})"

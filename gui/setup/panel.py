@@ -46,9 +46,9 @@ LOW = 660
 NAMED = 4
 """Changed parameters in the name of a run."""
 
-SETTLE = 250
-"""Milliseconds without a keystroke before the plan is computed anew."""
-
+SETTLE, SECOND = 250, 1000
+"""Time without a keystroke before the plan is computed anew, and from one word on one
+that is not there yet to the next, ms."""
 
 WARNINGS, TALL = 3, 800
 """Warnings shown where the panel is so high, px, else one; the tool tip has them all,
@@ -73,6 +73,8 @@ class SetupPanel(QFrame):
         self._timer.setSingleShot(True)
         self._timer.setInterval(SETTLE)
         self._timer.timeout.connect(self.plan_now)
+        self._waits = QTimer(self, interval=SECOND)
+        self._waits.timeout.connect(self._wait_on)
         self.picker = Picker()
         self.strip = label("", "strip", wrap=True)
         self.strip.hide()
@@ -148,6 +150,7 @@ class SetupPanel(QFrame):
             return
         try:
             self._session.plan.make(self.request())
+            self._waits.start()
         except FieldError as error:
             self._show_problem(str(error))
 
@@ -218,15 +221,15 @@ class SetupPanel(QFrame):
         busy = snapshot.state.in_run
         self._in_progress = busy and self._shows_run_in_progress()
         editing = self.subject.edited is not None
+        planning = self._session.plan.lasts if snapshot.bench else ""
         self.picker.setEnabled(not editing)
         told = self.subject.words(busy=busy, shown=self._in_progress)
         self._show_strip(told, warning=bool(told) and told == self.subject.lost)
         if editing:
-            self.buttons.show_edit(self._unusable)
+            self.buttons.show_edit(self._unusable, planning)
         else:
-            self.buttons.show_next(
-                snapshot.state, self._blocked(), cannot_wait=self._cannot_wait
-            )
+            waits = {"cannot_wait": self._cannot_wait, "planning": planning}
+            self.buttons.show_next(snapshot.state, self._blocked(), **waits)
 
     def show_head(self, time: float | None) -> None:
         """Put the preview's play-head, where it shows the run in progress."""
@@ -254,8 +257,15 @@ class SetupPanel(QFrame):
             return "Save or cancel the changes to the queued run first."
         problem = self._unusable
         if not problem and self._session.plan.expectation is None:
-            problem = "The plan is being computed."
+            problem = "The plan is being computed: a long run's takes seconds."
         return run_problem(self._snapshot, form_problem=problem)
+
+    def _wait_on(self) -> None:
+        """The plan is not there yet: say so, and nothing of the one before."""
+        if self._session.plan.request != self.request():
+            self.preview.show_preview(None)
+            self.estimate.show_estimate(None)
+        self.render_snapshot(self._snapshot)
 
     def _is_planned(self, then: Callable[[], None]) -> bool:
         """Whether the plan is that of the form; if not, `then` follows it."""
@@ -272,6 +282,7 @@ class SetupPanel(QFrame):
             self._once_planned = None
 
     def _planned(self) -> None:
+        self._waits.stop()
         expectation = self._session.plan.expectation
         self._show_problem(self._session.plan.problem)
         self.star.mark()
@@ -297,6 +308,8 @@ class SetupPanel(QFrame):
 
     def _form_changed(self) -> None:
         self._once_planned, self.subject.lost = None, ""
+        self._session.plan.forget()
+        self._waits.stop()
         self._show_problem(self._mistake)
         self._timer.start()
         self.render_snapshot(self._snapshot)

@@ -11,6 +11,7 @@ from gui.parts import IconButton
 from gui.session.queue import Queued
 from gui.setup.queue import QueueView
 from gui.state import WindowState
+from tactile_lab.engine.engine import Reply
 from tactile_lab.engine.request import Request
 
 BUILT_IN = resources.files("tactile_lab.scene").joinpath("simulated_bench.toml")
@@ -234,6 +235,44 @@ def test_stop_forgets_a_run_that_waits_for_its_plan(lab) -> None:
     lab.until(lambda: session.plan.expectation is not None)
     lab.app.processEvents()
     assert not session.busy
+
+
+def test_a_plan_that_takes_long_says_so_at_the_buttons(lab, monkeypatch) -> None:
+    """Run stayed grey, or did nothing, and the cost was that of the plan before."""
+    window, session = lab.window, lab.session
+    setup, held = window.setup, []
+    buttons = setup.buttons
+
+    def wait(seconds: float) -> None:
+        session.plan._asked -= seconds
+        setup._wait_on()
+
+    monkeypatch.setattr(session.link, "ask", lambda *asked: held.append(asked))
+    session.plan.expectation = None
+    setup.form.propose({"hold": "400 ms"})
+    setup.plan_now()
+    assert buttons.run.text() == "Run", "most plans take a moment"
+    wait(3.2)
+    assert buttons.run.text() == "Planning, 3 s" and not buttons.run.isEnabled()
+    assert "plan is being computed" in buttons.run.toolTip()
+    assert setup.estimate._values[0].text() == "—"
+    assert setup.preview.plot is None and "plan" in setup.preview.nothing
+    item = Queued("one", setup.request())
+    session.queue.add(item)
+    setup.edit(item)
+    wait(2.0)
+    assert buttons.save.text() == "Planning, 2 s"
+    setup.cancel()
+    session.queue.remove(item)
+    monkeypatch.undo()
+    setup.form.propose({"hold": "x"})
+    problem = setup.problem.text()
+    held[-1][0](Reply(None, ""))  # of what the form asked for before
+    assert problem and setup.problem.text() == problem, "it counts no more"
+    setup.form.propose({"hold": "300 ms"})
+    setup.plan_now()
+    lab.until(lambda: session.plan.expectation is not None)
+    assert buttons.run.text() == "Run" and buttons.run.isEnabled()
 
 
 def test_nothing_is_queued_for_no_bench(lab) -> None:
