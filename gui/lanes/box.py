@@ -23,7 +23,6 @@ from gui.lanes.source import Source
 from gui.look.tokens import Tokens
 from gui.plots.axis import guarded
 from gui.plots.numbers import decimals, nice_range, number, signed, value_ticks
-from tactile_lab.measurement import BETWEEN_SAMPLES
 from tactile_lab.trace import Trace
 
 DOTS = 160
@@ -409,10 +408,12 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
         ]
         for one in laws:
             paint.polyline(painter, frame.x(one.time), frame.y(one.mean), line)
-        if not on.source.counted:
-            at = QPointF(frame.left + 5, 9)
-            text = f"no rate: {BETWEEN_SAMPLES}"
-            paint.write_on(painter, at, text, ink, on.tokens.plot)
+        for step, why in on.source.unrated:
+            if step.start < frame.end and frame.start < step.end:
+                at = QPointF(max(frame.left, frame.x1(step.start)) + 5, 9)
+                text = f"no rate: {why.partition(';')[0]}"
+                paint.write_on(painter, at, text, ink, on.tokens.plot)
+                break
         if laws:
             at = QPointF(frame.right - 5, 9)
             paint.write(painter, at, "dashed: fitted α exp(βt) + γ", ink, align=1.0)

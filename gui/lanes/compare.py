@@ -6,6 +6,7 @@ ones and the rate lie over each other.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from enum import Enum
 from typing import TYPE_CHECKING
@@ -66,13 +67,9 @@ class Comparison(Source):
         return self._members
 
     @property
-    def rated(self) -> FloatArray:
+    def unrated(self) -> Sequence[tuple[Stretch, str]]:
         """Of the reference."""
-        return self.first.rated
-
-    def tells_rate(self, start: float, end: float) -> bool:
-        """As the reference does."""
-        return self.first.tells_rate(start, end)
+        return self.first.unrated
 
     @property
     def reach(self) -> float:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from pathlib import Path
 
 import numpy as np
 
-from gui.lanes.expected import Aligned, Preview, Stretch, settled
+from gui.lanes.expected import Aligned, Preview, Stretch, settled, starts
 from gui.lanes.phase import Phase, phase
-from gui.lanes.source import NONE, Source
+from gui.lanes.source import NONE, Source, no_counts
 from gui.lanes.twin import TwinTraces
 from tactile_lab.arrays import FloatArray
+from tactile_lab.measurement import TOO_FAST
 from tactile_lab.pyramid import Pyramid
 from tactile_lab.signals import AVERAGED
+from tactile_lab.spikes.false import are_false
 from tactile_lab.trace import Trace
 
 OSCILLATING = frozenset({"V_C2", "V_K"})
@@ -37,6 +40,7 @@ class LiveSource(Source):
     Attributes:
         model: the twin beside the run, as far as it has come.
         holds: the trials so far.
+        shortest_interval: less than any between two spikes of the sensor, s.
     """
 
     running = True
@@ -44,6 +48,7 @@ class LiveSource(Source):
     notes: list[tuple[float, str]] = []  # noqa: RUF012
 
     folder: Path | None = None
+    shortest_interval = 0.0
 
     def __init__(
         self,
@@ -65,6 +70,8 @@ class LiveSource(Source):
         self._slow = {name: Readings() for name in ("force", *AVERAGED)}
         self._spikes = np.empty(1024)
         self._spike_count = 0
+        self._judged: dict[int, tuple[int, int]] = {}
+        """Of each trial: intervals that are too short, and spikes."""
         self._of: LiveSource | None = None
 
     def frozen(self) -> LiveSource:
@@ -78,6 +85,7 @@ class LiveSource(Source):
         self._of, self.holds = of, list(self.holds)
         reach = self.reach
         self._slow = {name: one.until(reach) for name, one in self._slow.items()}
+        self._judged = dict(self._judged)
 
     @property
     def of(self) -> Source:
@@ -167,8 +175,33 @@ class LiveSource(Source):
         need = self._spike_count + len(times)
         if need > self._spikes.size:
             self._spikes = np.concatenate([self._spikes, np.empty(max(need, 1024))])
+        before = self._spikes[self._spike_count - 1] if self._spike_count else -np.inf
         self._spikes[self._spike_count : need] = times
         self._spike_count = need
+        self._judge(np.array([before, *times]))
+
+    def _judge(self, times: FloatArray) -> None:
+        """Count the intervals between new spikes that no circuit gives.
+
+        Args:
+            times: s, after the spike before them.
+        """
+        trial = np.searchsorted(starts(self.holds), times, side="right") - 1
+        short = (np.diff(times) < self.shortest_interval) & (np.diff(trial) == 0)
+        for number in np.unique(trial[1:]).tolist():
+            mine = trial[1:] == number
+            false, seen = self._judged.get(number, (0, 0))
+            false += int(np.count_nonzero(short & mine))
+            self._judged[number] = false, seen + int(np.count_nonzero(mine))
+
+    @property
+    def unrated(self) -> Sequence[tuple[Stretch, str]]:
+        """Also the trials whose spikes come faster than the sensor can fire."""
+        false = {n for n, found in self._judged.items() if are_false(*found)}
+        if not false:
+            return super().unrated
+        why = [TOO_FAST if n in false else "" for n in range(len(self.holds))]
+        return (*super().unrated, *no_counts(self.holds, why))
 
     def add_current(self, time: float, amperes: float) -> None:
         """A read-back of the coil."""

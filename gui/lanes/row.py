@@ -21,6 +21,7 @@ from gui.lanes.source import Source
 from gui.look.theme import Theme
 from gui.parts import line
 from gui.plots.numbers import number, signed
+from tactile_lab.measurement import BETWEEN_SAMPLES, CUT_OFF, TOO_FAST
 
 if TYPE_CHECKING:
     from tactile_lab.store.statistics import SignalStatistics
@@ -29,8 +30,12 @@ ROOM = 96
 """Height of a card from which on there is room for statistics, px."""
 
 
-NOT_ALL = "not all are seen"
-"""Of spikes that fall between two samples: they have no rate, and no intervals."""
+UNRATED = {
+    BETWEEN_SAMPLES: "not all are seen",
+    TOO_FAST: "no count: too fast",
+    CUT_OFF: "no count: cut off",
+}
+"""Why spikes have no rate and no intervals, in few words."""
 
 
 class LaneRow:
@@ -59,7 +64,7 @@ class LaneRow:
         edge of the view, as the tag has it, and of spikes how many are in view.
         """
         lane, card, view = self.lane, self.card, self._stage.view
-        edge = source.right_edge(view, lane)
+        edge = source.reach if source.running else source.right_edge(view, lane)
         if len(source.members) > 1:
             self._show_runs(source, edge)
         elif lane.raster:
@@ -67,22 +72,22 @@ class LaneRow:
         else:
             known = None if source.running else self._values(source, edge)[0]
             card.show_value(newest(lane, source) if source.running else known)
-            untold = lane.key == "rate" and not source.counted
-            card.show_more(NOT_ALL if untold else self._at_cursors(source))
+            why = source.why_unrated(edge, edge) if lane.key == "rate" else ""
+            card.show_more(UNRATED[why] if why else self._at_cursors(source))
 
     def _show_spikes(self, source: Source, edge: float) -> None:
         spikes, steps, view = source.spikes, starts(source.holds), self._stage.view
         if source.running:
+            why = source.why_unrated(edge, edge)
             words = interval_text(spikes, source.reach, steps)
             self.card.show_value(newest(self.lane, source))
         else:
-            words = f"of {spikes.size}"
-            if source.tells_rate(view.start, edge):
-                words = view_text(spikes, view.start, edge, steps)
+            why = source.why_unrated(view.start, edge)
+            words = view_text(spikes, view.start, edge, steps)
             seen = count_between(spikes, view.start, edge)
             self.card.show_value(float(seen), "in view")
-        if not source.counted:
-            words = NOT_ALL
+        if why:
+            words = UNRATED[why]
         if view.cursors is not None:
             words = f"{count_between(spikes, *sorted(view.cursors))} between A and B"
         self.card.show_more(words)

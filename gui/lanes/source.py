@@ -5,8 +5,10 @@ All times are on the run's axis, s; values are SI unless a lane's unit is asked 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +18,7 @@ from gui.lanes.expected import Preview, Stretch, starts
 from gui.lanes.lane import Lane
 from gui.lanes.rate import rate_of
 from tactile_lab.arrays import FloatArray
+from tactile_lab.measurement import BETWEEN_SAMPLES
 from tactile_lab.spikes.rate import rate_at
 from tactile_lab.trace import Trace
 
@@ -23,6 +26,24 @@ if TYPE_CHECKING:
     from gui.lanes.view import TimeView
 
 NONE = np.empty(0)
+ALWAYS = Stretch(-math.inf, math.inf, "")
+
+
+def no_counts(
+    holds: Sequence[Stretch], reasons: Sequence[str]
+) -> list[tuple[Stretch, str]]:
+    """Steps whose spikes are no count, and why.
+
+    Each reaches to the next step, and the first from the run's beginning: what comes
+    between is found in the same way.
+
+    Args:
+        holds: all steps, ascending.
+        reasons: of each; "" where its spikes are a count.
+    """
+    edges = [-math.inf, *(hold.start for hold in holds[1:]), math.inf]
+    each = zip(holds, pairwise(edges), reasons, strict=False)
+    return [(replace(one, start=a, end=b), why) for one, (a, b), why in each if why]
 
 
 class Source:
@@ -41,13 +62,29 @@ class Source:
     path: Path | None = None
 
     @property
-    def rated(self) -> FloatArray:
-        """Spikes of which a rate is told, s: all, where all are seen."""
-        return self.spikes if self.counted else NONE
+    def unrated(self) -> Sequence[tuple[Stretch, str]]:
+        """Where spikes are no count, so that no rate of them is told, and why."""
+        return () if self.counted else ((ALWAYS, BETWEEN_SAMPLES),)
 
-    def tells_rate(self, start: float, end: float) -> bool:
-        """Whether the spikes between two times, s, are a count, so have a rate."""
-        return self.counted
+    @property
+    def rated(self) -> FloatArray:
+        """Spikes of which a rate is told, s: those that are a count."""
+        spikes, unrated = self.spikes, self.unrated
+        if not unrated:
+            return spikes
+        told = np.full(spikes.size, True)
+        for one, _ in unrated:
+            first, last = np.searchsorted(spikes, (one.start, one.end))
+            told[first:last] = False
+        kept: FloatArray = spikes[told]
+        return kept
+
+    def why_unrated(self, start: float, end: float) -> str:
+        """Why no rate is told between two times, s; "" where one is."""
+        touched = (
+            why for one, why in self.unrated if one.start < end and start < one.end
+        )
+        return next(touched, "")
 
     @property
     def of(self) -> Source:
@@ -147,7 +184,7 @@ class Source:
 
     def rate(self, time: float) -> float | None:
         """Rate at a time, s, in Hz; None where it cannot be told."""
-        if not self.tells_rate(time, time):
+        if self.why_unrated(time, time):
             return None
         return rate_at(self.rated, time, starts(self.holds))
 

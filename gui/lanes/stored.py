@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gui.lanes.expected import Stretch, settled
-from gui.lanes.source import Source
+from gui.lanes.source import Source, no_counts
 from gui.lanes.twin import MARGIN, Look, TwinTraces
 from tactile_lab.arrays import FloatArray
 from tactile_lab.engine.events import ModelPart
@@ -68,8 +69,7 @@ class RunSource(Source):
         self.onsets = _onsets(run, self.trials)
         self.uncounted = uncounted(run)
         self.counted = samples_catch_spikes(run)
-        reasons = zip(self.holds, self.uncounted, strict=True)
-        self._unrated = [hold for hold, why_not in reasons if why_not]
+        self._unrated = [*super().unrated, *no_counts(self.holds, self.uncounted)]
         self.simulated = run.simulated
         self.moves_probes, self.sets_voltages = _moves(run)
         self._threshold = threshold_of(run)
@@ -99,21 +99,9 @@ class RunSource(Source):
         return bool(self._pyramids)
 
     @property
-    def rated(self) -> FloatArray:
-        """Those of the steps whose spikes are a count."""
-        if not self._unrated:
-            return super().rated
-        told = np.full(self.spikes.size, self.counted)
-        for one in self._unrated:
-            first, last = np.searchsorted(self.spikes, (one.start, one.end))
-            told[first:last] = False
-        kept: FloatArray = self.spikes[told]
-        return kept
-
-    def tells_rate(self, start: float, end: float) -> bool:
-        """Not where they touch a step whose spikes are no count."""
-        unrated = any(one.start < end and start < one.end for one in self._unrated)
-        return self.counted and not unrated
+    def unrated(self) -> Sequence[tuple[Stretch, str]]:
+        """The steps whose spikes are no count."""
+        return self._unrated
 
     @property
     def loop(self) -> FloatArray:

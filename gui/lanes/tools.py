@@ -210,7 +210,7 @@ class Tools(QWidget):
         count = int(np.diff(np.searchsorted(spikes, [low, high]))[0])
         span = high - low
         whose = f"{MARKS[0]} " if len(self._stack.source.members) > 1 else ""
-        told = span > 0 and self._stack.source.tells_rate(low, high)
+        told = span > 0 and not self._stack.source.why_unrated(low, high)
         rate = f" · {whose}<b>{count / span:.3g} Hz</b>" if told else ""
         boxes = [
             f'<span style="background:{colour};color:{tokens.on_accent};'

@@ -55,22 +55,19 @@ class RunResults(QObject):
         self._view = view
         self._whole = False
         self._elsewhere = False
-        self._uncounted = ""
         self._total = 0
         self._desk, self._run = session.desk, session.run
         self._asked = 0
         self._fits = False
         self._next: tuple[tuple[MeasuredTrial, ...], FitInput] | None = None
 
-    def begin(self, steps: int, *, fires: bool, uncounted: str = "") -> None:
+    def begin(self, steps: int, *, fires: bool) -> None:
         """A run of so many steps begins.
 
         Args:
             steps: how many.
             fires: whether its spikes are looked for.
-            uncounted: why they are not all counted; "" where they are.
         """
-        self._uncounted = uncounted
         self._empty(steps, fires=fires, running=True)
 
     def plan(self, *, fires: bool) -> None:
@@ -89,7 +86,9 @@ class RunResults(QObject):
     def step(self, outcome: Outcome, source: LiveSource | None) -> None:
         """A step has ended."""
         self._elsewhere |= outcome.trial.probes != "circuit"
-        found = of_outcome(outcome, self._uncounted)
+        middle = outcome.start + outcome.trial.length / 2
+        why_not = "" if source is None else source.why_unrated(middle, middle)
+        found = of_outcome(outcome, why_not)
         if found is not None:
             self.steps.append(found)
         self._show(running=True)

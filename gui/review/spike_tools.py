@@ -175,7 +175,7 @@ class SpikeTools(QObject):
                 said += f"\nafter {show(isi, 's', 4)} of silence"
             else:
                 said += f"\n{show(isi, 's', 4)} after the one before"
-                if self._source.tells_rate(chosen - isi, chosen):
+                if not self._source.why_unrated(chosen - isi, chosen):
                     said += f" ({number(1 / isi, 2)} Hz)"
         if shapes is not None:
             near = int(np.argmin(np.abs(shapes.times - chosen)))

@@ -24,7 +24,6 @@ from tactile_lab.acquisition.events import RunState
 from tactile_lab.engine.memory import trim
 from tactile_lab.engine.threads import start
 from tactile_lab.errors import RunFolderError, TactileLabError
-from tactile_lab.measurement import BETWEEN_SAMPLES
 from tactile_lab.quantity import looked_for, show
 from tactile_lab.signals import AVERAGED
 from tactile_lab.store.catalogue import Catalogue
@@ -246,8 +245,7 @@ class Screen(QObject):
             holds = expectation.preview.holds if expectation else []
             steps = sum(not hold.pause for hold in holds)
             searched = expectation is None or expectation.needs.detect_on is not None
-            why_not = "" if source.counted else BETWEEN_SAMPLES
-            self.results.begin(steps, fires=searched, uncounted=why_not)
+            self.results.begin(steps, fires=searched)
             if session.run.folder is not None:
                 self._panels.review.runs.show_current(session.run.folder)
             self.list_runs()

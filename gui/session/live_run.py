@@ -328,6 +328,7 @@ class LiveRun(LiveTask):
         preview = plan.preview if plan else None
         self.source = LiveSource(preview, event.newtons_per_ampere, event.folder)
         self.source.simulated, self.source.counted = event.simulated, event.counted
+        self.source.shortest_interval = event.shortest_interval
         for warning in plan.warnings if plan else ():
             self._log.add(Severity.WARNING, "plan", warning)
         self.begun.emit(self.source)

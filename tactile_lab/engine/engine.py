@@ -299,6 +299,8 @@ class ServedTask:
             self._instruments.release()
 
     def _make_and_run(self) -> Ending:
+        from tactile_lab.model.equations import shortest_interval
+
         try:
             task = self._make(self)
         except (TactileLabError, OSError) as error:
@@ -322,6 +324,7 @@ class ServedTask:
                 critical_V_C1=task.scene.circuit.critical_V_C1,
                 simulated=task.scene.bench.simulated,
                 counted=task.counted,
+                shortest_interval=shortest_interval(task.scene.circuit),
             )
         )
         return self._run(task)

@@ -26,6 +26,7 @@ class Begun:
         critical_V_C1: the sensor fires below it, V.
         simulated: whether its bench is.
         counted: whether all spikes are seen: none falls between two samples.
+        shortest_interval: less than any between two spikes of the sensor, s.
     """
 
     folder: Path | None
@@ -34,6 +35,7 @@ class Begun:
     critical_V_C1: float
     simulated: bool
     counted: bool = True
+    shortest_interval: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,9 @@ from tactile_lab.errors import SceneError
 from tactile_lab.measurement import BETWEEN_SAMPLES, CUT_OFF, TOO_FAST
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import shortest_interval
+from tactile_lab.spikes.false import are_false
 from tactile_lab.store.overrange import unsearched
 from tactile_lab.store.stored_run import StoredRun
-
-FEWEST, FALSE = 3, 0.1
-"""So many intervals, and such a part of them, that no circuit can give: more than a
-spike that noise adds now and then among right ones."""
 
 
 def uncounted(run: StoredRun) -> list[str]:
@@ -35,12 +32,9 @@ def uncounted(run: StoredRun) -> list[str]:
 
 
 def faster_than(circuit: Circuit, spike_times: FloatArray) -> bool:
-    """Whether spikes, s, shape (n,), come faster than `circuit` can fire.
-
-    A few that do are let pass, as false ones among right ones.
-    """
+    """Whether spikes, s, shape (n,), come faster than `circuit` can fire."""
     short = np.count_nonzero(np.diff(spike_times) < shortest_interval(circuit))
-    return bool(short >= max(FEWEST, FALSE * (spike_times.size - 1)))
+    return are_false(int(short), spike_times.size)
 
 
 def samples_catch_spikes(run: StoredRun) -> bool:

@@ -251,3 +251,25 @@ def test_what_is_frozen_has_nothing_that_came_later(later: int) -> None:
             assert 0.95 < found.end <= frozen.reach + 1e-9, (start, end)
             assert found.extent == (1.0, 1.0)
     assert frozen.measured("V_C1", 2.0, 3.0, 500).empty
+
+
+def test_spikes_that_no_circuit_gives_have_no_rate_as_they_come() -> None:
+    """Of one step alone, and only where they are more than one now and then."""
+    source = LiveSource(None, 1.0)
+    source.shortest_interval = 0.01
+    for at in range(2):
+        source.begin_trial(at, Stretch(2.0 * at, 2.0 * at + 2, str(at)))
+    right = (0.5, 0.505, 0.6, 0.7, 0.8, 0.9, 1.0)
+    source.add_spikes(right)
+    source.add_spikes(())
+    assert not source.unrated and source.rate(1.0) == pytest.approx(10)
+    for first in (2.1, 2.15):  # also those of two messages beside each other
+        source.add_spikes((first, first + 0.001))
+    assert not source.unrated
+    frozen = source.frozen()
+    source.add_spikes((2.152,))
+    assert [one.label for one, _ in source.unrated] == ["1"] and not frozen.unrated
+    assert source.rate(2.153) is None and source.rate(1.0) == pytest.approx(10)
+    assert source.rated.tolist() == list(right)
+    drawn = source.trace("rate", 0.0, 4.0, 100)
+    assert not drawn.empty and drawn.time.max() < 2.0

@@ -1,11 +1,11 @@
-"""No rate is told where spikes fall between two samples of V_K, as in the report."""
+"""No rate is told of spikes that are no count, as in the report."""
 
 import h5py
 import numpy as np
 
 from tactile_lab.engine.execution import Execution
 from tactile_lab.engine.request import Request
-from tactile_lab.measurement import BETWEEN_SAMPLES
+from tactile_lab.measurement import BETWEEN_SAMPLES, TOO_FAST
 from tactile_lab.scene.load import load
 from tactile_lab.store.run import Run
 
@@ -53,6 +53,28 @@ def test_a_run_tells_no_rate_of_spikes_that_are_not_all_seen(lab) -> None:
     assert "Hz" not in window.centre.tools.readout.toolTip()
     window.centre.view.clear_cursors()
     assert told(lab, "rate") == ("—", "not all are seen")
+
+
+def test_a_run_tells_no_rate_of_spikes_that_no_circuit_gives(lab) -> None:
+    """Live the lane drew 20 kHz of noise at the threshold; the record refused it."""
+    window, session = lab.window, lab.session
+    noisy = (
+        'protocol.levels=["80 mN", "200 mN"]', 'protocol.hold="200 ms"',
+        'record.sample_rate="1 MS/s"', 'simulated.noise.V_K="150 mV"',
+        'simulated.deviation.V_GS="4 mV"',
+    )  # fmt: skip
+    session.start(Request(str(lab.folder / "short.toml"), noisy, "sim"), "Noisy")
+    lab.until(lambda: not session.busy)
+    live = session.source
+    why = [one.uncounted for one in window.screen_.results.steps]
+    assert why == [TOO_FAST, TOO_FAST], "told as each step ended"
+    window.centre.stack.show_values()
+    assert told(lab, "rate") == ("—", "no count: too fast")
+    assert told(lab, "spikes")[1] == "no count: too fast"
+    assert live.spikes.size > 100 and live.rated.size == 0
+    folder = session.run.folder
+    lab.until(lambda: getattr(window.screen_.run, "path", None) == folder)
+    assert window.screen_.run.uncounted == why, "as the record has it"
 
 
 def test_a_run_that_sees_all_spikes_tells_their_rate(lab) -> None:
