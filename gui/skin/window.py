@@ -152,6 +152,7 @@ class SkinWindow(QWidget):
         self._timer.start(FRAME)
         self._enable(False)
         say(self.when, "computing …")
+        self.setFocus()  # not STOP, which Space would press
 
     def show_time(self, at: float) -> None:
         """Show the spikes in the stretch before `at` s."""

@@ -108,17 +108,23 @@ def gain(
     freedom = t.size - design.shape[1] - len(beside)
     alike = correlated(left)
     scatter = math.sqrt(float(np.sum(left**2)) / max(freedom, 1))
-    error = scatter * math.sqrt(alike * float(np.sum(inverse[0] ** 2)))
-    free = max(1, int(freedom / alike))
     size = max(abs(got), 1e-300)
+    # sine and cosine are not known alike where drift is allowed for: along the answer
+    # lies the gain, across it the phase
+    turned = (got.conjugate() / size) * (inverse[0] + 1j * inverse[1])
+    along, across = (
+        scatter * math.sqrt(alike * float(np.sum(part**2)))
+        for part in (turned.real, turned.imag)
+    )
+    free = max(1, int(freedom / alike))
     step = code or 2 * step_bias
     first = min(step_bias, step / math.pi)
     codes = 2 * first * min(MOST_BESSEL, math.sqrt(step / size) / math.pi)
     ratio = got / given
     return Gain(
         frequency,
-        Estimate.of(abs(ratio), error / abs(given), free).widened(codes / abs(given)),
-        Estimate.of(float(np.angle(ratio)), error / size, free),
+        Estimate.of(abs(ratio), along / abs(given), free).widened(codes / abs(given)),
+        Estimate.of(float(np.angle(ratio)), across / size, free),
         abs(given),
     )
 

@@ -221,6 +221,8 @@ def test_stop_does_not_wait_while_a_skin_is_read(lab, folder, monkeypatch):
         assert window.size().boundedTo(room) == window.size(), "no part off the screen"
         (stop,) = (one for one in stops if one.window() is window)
         assert stop.isVisible(), "the window may cover that of the main one"
+        lab.until(window.isActiveWindow)
+        assert not stop.hasFocus(), "Space is for playing"
         lab.until(lambda stop=stop: stop.words == stops[0].words)
         window.close()
     assert len(stops) == 1
