@@ -19,7 +19,8 @@ class ShownConclusion:
 
     Attributes:
         protocol: name.
-        statements: what the run says as a whole, one sentence each.
+        statements: what the run says as a whole, and what it cannot tell, and why, one
+            sentence each.
         verdicts: of a wiring check, one per channel.
         tables: for people.
         plots: the protocol's own.
@@ -47,7 +48,7 @@ def conclusion_of(folder: Path) -> ShownConclusion:
         made = folder / "calibration.csv"
         return ShownConclusion(
             protocol=found["protocol"],
-            statements=tuple(found.get("statements", ())),
+            statements=(*found.get("statements", ()), *found.get("missing", ())),
             verdicts=tuple(
                 ChannelVerdict(signal, bool(one["ok"]), str(one["text"]))
                 for signal, one in values.get("channels", {}).items()

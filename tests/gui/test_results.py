@@ -1,5 +1,6 @@
 """The results: any column of the steps against any other."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from PySide6.QtWidgets import QApplication, QFrame, QScrollArea
 
 from gui.lanes.expected import Stretch
 from gui.look.theme import Theme
+from gui.plots.numbers import unbroken
 from gui.record.progress import ProgressStrip
 from gui.review.live_plots import COLUMNS, column_plot, rate_plot, train_plot
 from gui.review.results import ResultsView
@@ -274,3 +276,14 @@ def test_a_step_that_was_cut_short_says_so_in_full(results: ResultsView, app) ->
     assert words < table.columnWidth(0)
     heads = table.horizontalHeader()
     assert all(heads.sectionSize(k) >= heads.sectionSizeHint(k) for k in range(1, 6))
+
+
+def test_what_a_report_cannot_tell_is_told_with_what_it_can(lab, tmp_path) -> None:
+    """Six of 24 frequencies of a sweep were not in its plot, and nothing said why."""
+    why = "No gain at 0.1 Hz: V_C1 left its channel's range."
+    told = {"protocol": "sine_sweep", "conclusion": None, "missing": [why]}
+    (tmp_path / "results.json").write_text(json.dumps(told | {"statements": ["Fair."]}))
+    lab.window.screen_.results._conclude(tmp_path)
+    shown = lab.window.review.results.statements.text()
+    assert shown.splitlines() == ["Fair.", unbroken(why)]
+    lab.window.screen_.results.clear()
