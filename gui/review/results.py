@@ -344,6 +344,7 @@ class ResultsView(QWidget):
         header = table.horizontalHeader()
         # what is left out of a long name is in its middle: "90 m…0625 V"
         table.setTextElideMode(Qt.TextElideMode.ElideMiddle)
+        table.setWordWrap(False)  # else it is of two lines, of which one is seen
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         header.setMinimumSectionSize(36)

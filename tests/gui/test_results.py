@@ -153,6 +153,8 @@ def test_the_table_is_as_high_as_its_steps(results: ResultsView) -> None:
     one, two = (high(count, running=False) for count in (1, 2))
     assert two - one == results.table.rowHeight(0)
     assert high(1, running=True) == high(3, running=True), "nothing below it moves"
+    # of "120 mN, 1 set-point skipped" it told "120 mN, …-point …"
+    assert not results.table.wordWrap(), "a long name is one line without its middle"
 
 
 def test_a_wide_table_of_the_report_pushes_nothing_out_of_the_page(
