@@ -11,6 +11,7 @@ from gui.lanes.stack import LaneStack
 from gui.preferences import Preferences, from_anywhere
 from gui.screen.screen import Screen
 from gui.session.session import Session
+from gui.state import CoilKnowledge, Snapshot, WindowState, stop_truth
 
 APART = 400
 """Time between two of the sounds of a fault, ms."""
@@ -28,7 +29,7 @@ class Habits(QObject):
     ) -> None:
         super().__init__(screen)
         self._session, self._wishes, self._screen = session, preferences, screen
-        self._rings = 0
+        self._rings, self._unknown = 0, False
         self._bell = QTimer(self, singleShot=True)
         self._bell.timeout.connect(self._ring)
         session.run.ended.connect(lambda done: self._sound(1))
@@ -45,6 +46,14 @@ class Habits(QObject):
         run.reports, run.publish = wishes.wants("reports"), wishes.wants("lsl")
         self._session.keep_in(self._wishes.folder)
         self._screen.list_runs()
+
+    def mind_coil(self, snapshot: Snapshot) -> None:
+        """Ring as at a fault where nobody knows the coil any more: a run ends later."""
+        coil, left = snapshot.coil, snapshot.left_unknown
+        said = stop_truth(snapshot.state, coil, left) is CoilKnowledge.UNKNOWN
+        if said and not self._unknown and snapshot.state is not WindowState.FAULT:
+            self._sound(3)
+        self._unknown = said
 
     def _sound(self, times: int) -> None:
         """Ring in a turn of its own: a run that a fault ends is no end beside it."""

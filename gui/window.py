@@ -302,6 +302,7 @@ class Window(QMainWindow):
         session.status.changed.connect(self.render_state)
         self.screen_.changed.connect(self.render_state)
         self.frames.told.connect(self.render_clock)
+        self.frames.told.connect(self._habits.mind_coil)
         self.actions_.fold_asked.connect(self.fold)
         self.actions_.lanes_asked.connect(self.part_lanes)
         sides = (self.setup, self.review)

@@ -18,7 +18,7 @@ from gui.lanes.expected import Preview, Stretch
 from gui.lanes.live import LiveSource
 from gui.lanes.source import PlanSource
 from gui.session.steps import facts_of
-from gui.state import CoilKnowledge, Lamp, WindowState, truth
+from gui.state import CoilKnowledge, CoilView, Lamp, Snapshot, WindowState, truth
 from sim_backend.serial_line import wires as serial_wires
 from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.acquisition.ending import Ending
@@ -233,6 +233,7 @@ def test_unplugged_coil_becomes_a_fault_that_says_what_to_do(lab, monkeypatch) -
     bell = SimpleNamespace(beep=lambda: rings.append(session.state.value))
     monkeypatch.setattr("gui.habits.QApplication", bell)
     monkeypatch.setattr("gui.habits.APART", 1)
+    monkeypatch.setattr("gui.habits.stop_truth", lambda *_: None)  # rings of its own
     monkeypatch.setattr(window.preferences, "wants", lambda switch: switch == "sound")
     lab.run()
     newest_coil().faults.add(SerialFault(kind="unplug", times=None))
@@ -251,6 +252,19 @@ def test_unplugged_coil_becomes_a_fault_that_says_what_to_do(lab, monkeypatch) -
     assert not window.setup.run.isEnabled(), "and nothing runs beside it"
     lab.until(lambda: session.state is WindowState.READY)
     assert window.header.stop.truth is CoilKnowledge.OFF, "the instruments were asked"
+
+
+def test_the_bell_rings_as_soon_as_nobody_knows_the_coil(lab, monkeypatch) -> None:
+    """A source fell silent in a run; it rang 17 s later, as the run had ended."""
+    window = lab.window
+    rings: list[int] = []
+    monkeypatch.setattr(window._habits, "_sound", rings.append)
+    live = Snapshot(state=WindowState.RUNNING, coil=CoilView(output=True))
+    silent = replace(live, coil=CoilView(output=True, age=2.0))
+    for told, times in ((live, 0), (silent, 1), (silent, 1), (live, 1), (silent, 2)):
+        window.frames.told.emit(told)
+        assert rings == times * [3]
+    window.render_state()
 
 
 def test_reconnecting_makes_the_coil_known_again(lab) -> None:
