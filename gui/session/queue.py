@@ -109,9 +109,11 @@ class Queue(QObject):
         item.left = "was taken out of the queue"
         self.changed.emit()
 
-    def replace(self, item: Queued, request: Request, expectation: Expectation) -> None:
+    def replace(
+        self, item: Queued, title: str, request: Request, expectation: Expectation
+    ) -> None:
         """Have a waiting run do something else, at its place."""
-        item.request, item.expectation = request, expectation
+        item.title, item.request, item.expectation = title, request, expectation
         self.changed.emit()
         self.next()
 

@@ -67,7 +67,7 @@ class SetupPanel(QFrame):
         self.setMinimumWidth(304)
         self._session, self._theme = session, theme
         self._snapshot = Snapshot()
-        self._in_progress = False
+        self._in_progress = self._names = False
         self._once_planned: Callable[[], None] | None = None
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
@@ -181,7 +181,10 @@ class SetupPanel(QFrame):
 
     def edit(self, item: Queued) -> None:
         """Take up a waiting run's parameters into the form."""
+        before = self.subject.edited
         problem = self.subject.edit(item)
+        if self.subject.edited is not before:
+            self._names = item.title == self.title
         if problem:
             self._show_strip(problem, warning=True)
         elif self.form.fields:
@@ -194,9 +197,9 @@ class SetupPanel(QFrame):
         if item is None or self._unusable or not self._is_planned(self.save):
             return
         assert plan is not None
-        request = self.request()
+        asked = self.title if self._names else item.title, self.request(), plan
         self.subject.leave()
-        self._session.queue.replace(item, request, plan)
+        self._session.queue.replace(item, *asked)
         self.queue.focus_on(item)
 
     def cancel(self) -> None:

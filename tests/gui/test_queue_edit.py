@@ -35,6 +35,25 @@ def test_queued_run_is_edited_in_place_while_a_run_is_in_progress(lab) -> None:
     idle_after_run(lab)
 
 
+def test_a_waiting_run_that_was_named_by_its_parameters_is_named_anew(lab) -> None:
+    """Edited to 900 ms it went on to be called "Pulses · 800 ms", also as it ran."""
+    session, setup = lab.session, lab.window.setup
+    before = setup.form.texts()["hold"]
+    setup.form.propose({"hold": "800 ms"})
+    setup.enqueue()
+    lab.until(lambda: session.queue.items)
+    (item,) = session.queue.items
+    assert "800 ms" in item.title
+    setup.edit(item)
+    setup.form.propose({"hold": "900 ms"})
+    setup.save()
+    lab.until(lambda: setup.subject.edited is None)
+    assert item.request.load().protocol.hold == 0.9
+    assert "900 ms" in item.title and "800 ms" not in item.title
+    setup.form.propose({"hold": before})
+    idle(lab)
+
+
 def test_cancel_leaves_queue_and_form_as_they_were(lab) -> None:
     session, setup = lab.session, lab.window.setup
     setup.form.propose({"hold": "800 ms"})
