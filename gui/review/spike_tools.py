@@ -119,7 +119,9 @@ class SpikeTools(QObject):
         self._shown = now
         within = Intervals.of(spikes, starts(self._source.holds)).between(*self._span)
         plots = interval_plot(within), succession_plot(within, view.spike)
-        self._view.show_intervals(within.text, *plots)
+        why = self._source.why_unrated(*self._span)
+        said = f"No count: {why}.\n{within.text}" if why else within.text
+        self._view.show_intervals(said, *plots)
         self._show_shape()
         self._read()
 

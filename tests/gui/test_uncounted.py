@@ -75,6 +75,11 @@ def test_a_run_tells_no_rate_of_spikes_that_no_circuit_gives(lab) -> None:
     folder = session.run.folder
     lab.until(lambda: getattr(window.screen_.run, "path", None) == folder)
     assert window.screen_.run.uncounted == why, "as the record has it"
+    window.review.show_tab(3)
+    window.spikes.look()
+    said = window.review.spikes.said.text()
+    window.review.show_tab(0)
+    assert said.startswith(f"No count: {TOO_FAST}") and "intervals" in said
 
 
 def test_a_run_that_sees_all_spikes_tells_their_rate(lab) -> None:
