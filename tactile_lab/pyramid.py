@@ -25,7 +25,7 @@ WAITING = 1 << 10
 """Cells of the finest level that may wait to be joined until a coarser one is read."""
 
 ROOM = 1 << 12
-"""Cells there is room for at first: zeroing memory for all at once takes a frame."""
+"""Room beyond twice what is held, cells: to zero all at once takes a frame."""
 
 
 class Level:
@@ -34,7 +34,6 @@ class Level:
     Args:
         keep: how many cells are kept; there is room for a quarter more.
         signal: of the traces it gives.
-        room: cells there is room for at first.
 
     Attributes:
         width: of a cell, s; 0 before the first.
@@ -42,15 +41,15 @@ class Level:
         count: cells added so far, forgotten ones included.
     """
 
-    def __init__(self, keep: int, signal: str = "", room: int = ROOM) -> None:
+    def __init__(self, keep: int, signal: str = "") -> None:
         self.width = 0.0
         self.end = 0.0
         self._signal = signal
         self.count = 0
         self._keep = keep
         self._first, self._last = 0, 0
-        self._values = np.empty((4, room))
-        self._gap = np.empty(room, np.bool_)
+        self._values = np.empty((4, 0))
+        self._gap = np.empty(0, np.bool_)
 
     def __len__(self) -> int:
         return self._last - self._first
@@ -113,12 +112,16 @@ class Level:
         return bool(self._gap[self._first + number - self.forgotten])
 
     def _make_room(self, more: int) -> None:
-        """Have room for `more` cells; what a trace still shows is never overwritten."""
+        """Have room for `more` cells; what a trace still shows is never overwritten.
+
+        The first to come get what they need: they may be all.
+        """
         if self._last + more <= self._gap.size:
             return
         kept = slice(max(self._first, self._last + more - self._keep), self._last)
         held = kept.stop - kept.start
-        size = min(2 * (held + more) + ROOM, self._keep + self._keep // 4)
+        grown = 2 * (held + more) + ROOM if held else more
+        size = min(grown, self._keep + self._keep // 4)
         values, gap = np.empty((4, size)), np.empty(size, np.bool_)
         values[:, :held], gap[:held] = self._values[:, kept], self._gap[kept]
         self._values, self._gap = values, gap
@@ -134,16 +137,16 @@ class Pyramid:
     kept, may be read or computed elsewhere and put in by `refine`.
     """
 
-    def __init__(self, room: int = ROOM) -> None:
-        self._levels = [Level(FINE, room=room)]
+    def __init__(self) -> None:
+        self._levels = [Level(FINE)]
         self._open: list[int] = [0]
         self._waiting = 0
         self._parts: tuple[tuple[float, float, Trace], ...] = ()
 
     @classmethod
     def of(cls, whole: Trace) -> Pyramid:
-        """A signal that is known already, in no more memory than it needs."""
-        made = cls(room=min(len(whole), FINE))
+        """A signal that is known already."""
+        made = cls()
         made.add(whole)
         return made
 

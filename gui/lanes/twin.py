@@ -41,10 +41,7 @@ class TwinTraces:
     def add(self, part: ModelPart) -> None:
         """Append the next slice."""
         for signal, bins in part.bins.items():
-            if signal in self._pyramids:
-                self._pyramids[signal].add(bins)
-            else:
-                self._pyramids[signal] = Pyramid.of(bins)
+            self._pyramids.setdefault(signal, Pyramid()).add(bins)
         if part.spikes.size:
             self._spikes.append(part.spikes)
         self.end = part.end

@@ -113,7 +113,7 @@ class RoundAxis(pg.AxisItem):  # type: ignore[misc]
             inside = [value for value in self.named if low <= value <= high]
             place = size / (high - low)
             few = with_room([place * value for value in inside], NAME)
-            return [(1.0, [inside[number_] for number_ in few])]
+            return [(1.0, [inside[n] for n in few])]
         if self.logMode:
             tens = range(math.floor(low) - 1, math.ceil(high) + 1)
             roomy = math.log10(2) * size >= self._apart / 2 * (high - low)
