@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,9 @@ from numpy.typing import ArrayLike
 from tactile_lab.analysis.estimate import Z95
 from tactile_lab.arrays import FloatArray
 from tactile_lab.scope import CLOCK_ERROR
+
+if TYPE_CHECKING:
+    from tactile_lab.store.signal import StoredSignal
 
 Shunt = Callable[[float, float], tuple[FloatArray, FloatArray]]
 """The coil current between two times, s: its bins' middles, s, and means, A."""
@@ -90,6 +93,32 @@ class AppliedCurrent:
             return None
         inside = (self.steps[:, 0] >= start) & (self.steps[:, 0] <= end)
         return self.timing + CLOCK_ERROR * float(self.away[inside].max(initial=0.0))
+
+
+def shunt_of(signal: StoredSignal, overrange: FloatArray) -> Shunt:
+    """Reads the recorded coil current between two times.
+
+    Args:
+        signal: the coil current.
+        overrange: shape (n, 2): between which times, s, its channel left its range:
+            from these it gives nothing.
+    """
+    begins, ends = overrange.T
+
+    def seen(start: float, end: float) -> tuple[FloatArray, FloatArray]:
+        if np.any((begins < end) & (ends > start)):
+            return np.empty(0), np.empty(0)
+        part = signal.between(start, end)
+        # as fine as edges are looked for in; a long level is read from the pyramid
+        wanted = round((part.stop - part.start) * signal.interval / BIN_TIME)
+        found = signal.trace(
+            part.start, part.stop, cells=min(max(1, wanted), MOST_BINS)
+        )
+        # the last may be short; a sample is of an instant, the first of its bin's
+        middle = (found.width - signal.interval) / 2
+        return found.time[:-1] + middle, found.mean[:-1]
+
+    return seen
 
 
 def applied_current(

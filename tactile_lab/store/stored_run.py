@@ -17,14 +17,13 @@ from tactile_lab.quantity import count, show
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.spikes.rate import rate_changes
 from tactile_lab.store.applied import (
-    BIN_TIME,
     BY_SAMPLES,
-    MOST_BINS,
     VISIBLE,
     VISIBLE_CODES,
     AppliedCurrent,
     Shunt,
     applied_current,
+    shunt_of,
 )
 from tactile_lab.store.data_file import check_inside, open_data
 from tactile_lab.store.folder import (
@@ -347,28 +346,11 @@ class StoredRun:
 
     @property
     def shunt(self) -> Shunt | None:
-        """Reads the recorded coil current between two times; None without one.
-
-        It gives nothing from times in which its channel left its range.
-        """
+        """Reads the recorded coil current between two times; None without one."""
         if "coil_current" not in self.signals:
             return None
         signal = self.signal("coil_current")
-        begins, ends = self.overrange("coil_current").T
-
-        def seen(start: float, end: float) -> tuple[FloatArray, FloatArray]:
-            if np.any((begins < end) & (ends > start)):
-                return np.empty(0), np.empty(0)
-            part = signal.between(start, end)
-            # as fine as edges are looked for in; a long level is read from the pyramid
-            wanted = round((part.stop - part.start) * signal.interval / BIN_TIME)
-            cells = min(max(1, wanted), MOST_BINS)
-            found = signal.trace(part.start, part.stop, cells=cells)
-            # the last may be short; a sample is of an instant, the first of its bin's
-            middle = (found.width - signal.interval) / 2
-            return found.time[:-1] + middle, found.mean[:-1]
-
-        return seen
+        return shunt_of(signal, self.overrange("coil_current"))
 
     @property
     def visible_step(self) -> float:
