@@ -7,11 +7,9 @@ import pytest
 from drivers.coil.source import CoilSource
 from drivers.coil.wire import CATCH_UP
 from drivers.registered import SERIAL_SOURCE
-from drivers.teslameter import Teslameter
 from sim_backend.coil.source import SimCoilSource
 from sim_backend.serial_line.faults import SerialFault
 from sim_backend.serial_line.wires import plug_in, unplug
-from sim_backend.teslameter import SimTeslameter
 from tactile_lab.bench import CoilLimits
 from tactile_lab.clock import SimulatedClock
 from tactile_lab.errors import (
@@ -21,7 +19,7 @@ from tactile_lab.errors import (
     NoReplyError,
     SceneError,
 )
-from tactile_lab.instruments.dialects import coil_dialect, teslameter_dialect
+from tactile_lab.instruments.dialects import coil_dialect
 from tactile_lab.scene.bench_file import CoilSpec
 from tactile_lab.scene.load import load
 
@@ -437,23 +435,6 @@ def test_the_limits_in_force_are_the_narrowest():
         KEPCO, "sim://x", CoilLimits(current=50.0, compliance=99.0), SimulatedClock()
     )
     assert (coil.limits.current, coil.limits.compliance) == (5.0, 20.0)
-
-
-def test_teslameter_reads_tesla(resistor):
-    clock, plant = SimulatedClock(), resistor
-    plant.output(0, True)
-    plant.set_current(0, 0.5)
-    row = teslameter_dialect("lakeshore-425")
-    end = plug_in(SimTeslameter(plant, row.id, clock), row.serial, clock, "meter")
-    meter = Teslameter(row, end.url, clock)
-    with clock.taking_part("test"):
-        meter.open()
-        assert meter.read().value == pytest.approx(5.5e-3, rel=1e-3)
-        assert meter.settings()["unit"] == "2"
-        plant.set_current(0, 1000.0)
-        with pytest.raises(LimitError, match="range"):
-            meter.read()
-        meter.close()
 
 
 @pytest.mark.parametrize("on", [True, False])

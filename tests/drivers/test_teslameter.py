@@ -59,6 +59,23 @@ def test_what_comes_before_its_time_is_not_heard(meter):
     other.close()
 
 
+def test_a_425_tells_its_unit_and_a_field_beyond_its_range(resistor):
+    clock, plant = SimulatedClock(), resistor
+    plant.output(0, True)
+    plant.set_current(0, 0.5)
+    row = load_dialect("lakeshore-425")
+    end = plug_in(SimTeslameter(plant, row.id, clock), row.serial, clock, "meter")
+    meter = Teslameter(row, end.url, clock)
+    with clock.taking_part("test"):
+        meter.open()
+        assert meter.read().value == pytest.approx(5.5e-3, rel=1e-3)
+        assert meter.settings()["unit"] == "2"
+        plant.set_current(0, 1000.0)
+        with pytest.raises(LimitError, match="range"):
+            meter.read()
+        meter.close()
+
+
 def test_overload_is_told(meter):
     _, plant, _, it = meter
     plant.set_current(0, 1000.0)

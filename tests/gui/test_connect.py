@@ -3,12 +3,10 @@
 import json
 import os
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from benches import READ_BY_HAND
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QPushButton
@@ -25,17 +23,10 @@ from gui.dialogs.instruments import InstrumentsPage
 from gui.review.conclusion import ShownConclusion, conclusion_of
 from gui.state import CoilKnowledge, FaultNotice, WindowState
 from sim_backend.serve import ServedBench
-from tactile_lab.acquisition.ending import Ending
-from tactile_lab.engine.commands import answer
-from tactile_lab.engine.engine import Engine
-from tactile_lab.engine.events import Ended, PersonAsked
-from tactile_lab.engine.link import RemoteTask
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import RunFolderError, SceneError
-from tactile_lab.quantity import show
 from tactile_lab.scene.load import load_bench
 from tactile_lab.scene.write_bench import write_bench
-from tactile_lab.store.run import Run
 
 
 def test_bench_file_reads_back_as_chosen(tmp_path: Path) -> None:
@@ -189,24 +180,6 @@ def test_wiring_check_runs_from_its_page_and_shows_its_verdicts(
     texts = [one.text() for one in dialog.wiring.findChildren(QLabel)]
     assert any("3 mV of 50 Hz hum" in text for text in texts)
     dialog.hide()
-
-
-def test_run_waits_for_a_person_until_it_is_done_or_stopped(lab) -> None:
-    window, session = lab.window, lab.session
-    done: list[object] = []
-    session.run.task = RemoteTask(0, lambda *said: done.append(said))
-    session.status.enter(WindowState.RUNNING)
-    session.run.take(PersonAsked("Put the probes on 0 V."))
-    lab.until(window.question.isVisible)
-    assert "0 V" in window.question.text.text()
-    assert window.question.entry.isHidden(), "there is nothing to type"
-    window.question.done.click()
-    assert done == [(Engine.say, answer, "")] and not window.question.isVisible()
-    session.run.take(PersonAsked("Put them on V_S."))
-    lab.until(window.question.isVisible)
-    session.run.take(Ended(Ending.refused("stopped at the bench")))
-    session.acknowledge()
-    assert not window.question.isVisible(), "a run that ended waits for nobody"
 
 
 def test_both_parts_of_the_loop_can_be_read_beside_what_was_found(lab) -> None:
@@ -408,68 +381,6 @@ def test_a_bench_that_cannot_be_connected_now_is_saved_and_says_so(lab) -> None:
     assert file.exists() and session.bench.choice != str(file)
     assert dialog.isVisible() and "is in use" in dialog.problem.text()
     dialog.hide()
-
-
-@pytest.fixture
-def calibrating(lab) -> Iterator:
-    """A short calibration in progress on a bench whose teslameter a person reads."""
-    (lab.folder / "by-hand.toml").write_text(READ_BY_HAND)
-    short = ("protocol.points=5", "protocol.loops=0", 'record.signals=["field"]')
-    request = Request("calibrate_field", short, str(lab.folder / "by-hand.toml"))
-    lab.session.start(request, "Calibration")
-    lab.until(lambda: lab.window.question.isVisible() or lab.session.status.fault)
-    yield lab
-    lab.session.source, lab.session.plan.expectation = (
-        None,
-        None,
-    )  # the plan is shown again
-
-
-def test_a_person_reads_the_field_for_a_calibration(calibrating) -> None:
-    lab = calibrating
-    session, card = lab.session, lab.window.question
-    asked: list[float] = []
-    while session.state is WindowState.RUNNING:
-        errand = session.run.asked
-        assert not card.doubt.text() or card.doubt.isHidden()
-        asked.append(errand.current)
-        held = card.coil.text().replace("\u00a0", " ")
-        assert f"holds {show(errand.current, 'A')}" in held
-        assert ("heat" in card.coil.text()) is (abs(errand.current) > 0.6)
-        assert not card.done.isEnabled(), "nothing is typed yet"
-        QTest.keyClicks(card.entry, f"{10.8 * errand.current:.2f}")
-        QTest.keyClick(card.entry, Qt.Key.Key_Return)
-        lab.until(lambda: session.run.asked or session.state is not WindowState.RUNNING)
-    lab.until(lambda: not session.busy)
-    assert session.status.fault is None
-    assert asked[:5] == pytest.approx([1.0, 0.5, 0.0, -0.5, -1.0])
-    assert lab.window.screen_.ending.endswith("spikes not looked for")
-    with Run.load(session.run.folder) as run:
-        assert run.field["field"] == pytest.approx([10.8e-3 * i for i in asked])
-    assert card.isHidden() and session.coil_view().verified_off
-    assert session.run.field == pytest.approx(10.8e-3 * asked[-1])
-    assert session._chips._meter().value == "—", "it was read in the run"
-
-
-def test_what_is_no_field_is_not_sent_and_what_is_doubted_asked_again(
-    calibrating,
-) -> None:
-    lab = calibrating
-    session, card = lab.session, lab.window.question
-    card.entry.setText("10.8 A")
-    assert not card.done.isEnabled() and "A" in card.understood.text()
-    QTest.keyClick(card.entry, Qt.Key.Key_Return)
-    assert session.run.asked is not None
-    card.entry.setText("−8000 µT")
-    assert card.understood.text() == "= −8 mT" and card.done.isEnabled()
-    card.done.click()
-    lab.until(lambda: session.run.asked is not None)
-    assert "check sign" in card.doubt.text() and card.doubt.isVisible()
-    assert "−8 mT at 1 A" in card.before.text()
-    assert card.entry.text() == "", "a second Enter alone confirms nothing"
-    card.stop.click()
-    lab.until(lambda: not session.busy)
-    assert card.isHidden() and session.coil_view().verified_off
 
 
 def test_a_card_that_closes_gives_the_keyboard_back_to_the_window(lab) -> None:
