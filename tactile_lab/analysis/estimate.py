@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 from tactile_lab.quantity import PREFIXES, prefix_of, printed
@@ -179,8 +180,23 @@ def correlated(residual: FloatArray, group: FloatArray | None = None) -> float:
     return together
 
 
+@cache
 def student_95(freedom: int) -> float:
-    """Two-sided 95 % quantile of Student's t; at least one degree of freedom."""
-    from scipy.special import stdtrit  # scipy.stats takes a second to import
+    """Two-sided 95 % quantile of Student's t; at least one degree of freedom.
 
-    return float(stdtrit(max(freedom, 1), 0.975))
+    By Newton's method on the integral of its density, which comes from below; within
+    1e-9 of SciPy's, whose special functions take 0.3 s and 17 MB to import.
+    """
+    import numpy as np
+
+    n, t = max(freedom, 1), Z95
+    at, weight = np.polynomial.legendre.leggauss(40)
+    power = math.lgamma((n + 1) / 2) - math.lgamma(n / 2) - math.log(n * math.pi) / 2
+
+    def density(x: FloatArray) -> FloatArray:
+        return np.exp(power - (n + 1) / 2 * np.log1p(x * x / n))
+
+    for _ in range(9):  # 8 for one degree of freedom
+        inside = t * float(weight @ density(t * (1 + at) / 2))
+        t += (0.95 - inside) / (2 * float(density(np.array(t))))
+    return t

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.special import stdtrit
 
 from tactile_lab.analysis.adaptation import fit_adaptation
 from tactile_lab.analysis.estimate import student_95
@@ -107,9 +108,9 @@ def test_a_rate_that_does_not_fall(slope):
         fit_adaptation(times, (0.0, 5.0))
 
 
-def test_students_quantile():
-    assert student_95(7) == pytest.approx(2.3646, abs=2e-3)
-    assert student_95(30) == pytest.approx(2.0423, abs=1e-4)
+@pytest.mark.parametrize("freedom", [1, 2, 3, 7, 30, 1000, 1_000_000])
+def test_students_quantile(freedom):
+    assert student_95(freedom) == pytest.approx(stdtrit(freedom, 0.975), rel=1e-8)
 
 
 def test_a_fall_within_the_first_interval_is_no_law():
