@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Callable
 from functools import cache
 from pickle import UnpicklingError
 from typing import Any
 
 from numba import njit
+from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.runtime.nrt import rtsys
 
@@ -44,6 +46,49 @@ def _say_unkept() -> None:
         "Compiled code cannot be kept: neither this installation nor your home can be "
         "written. Name a folder in the environment variable NUMBA_CACHE_DIR."
     )
+
+
+class _NotKept(BaseException):
+    """Code would have to be compiled; what handles errors of an act is not for it."""
+
+
+class _Refused(event.Listener):
+    """No code is compiled as long as it listens."""
+
+    def on_start(self, _: Any) -> None:
+        """Compiling would begin."""
+        raise _NotKept
+
+    def on_end(self, _: Any) -> None:
+        """Nothing to say."""
+
+
+def compiled_apart(act: Callable[[], None]) -> None:
+    """Do `act`, which may be begun twice; have a child compile what is not kept.
+
+    A compiler that has worked holds 60 MB until its process ends, and so does each that
+    is forked from it: too much for a process that is there for days. Where the disk
+    takes no code, it is compiled here. Forks: call it while there is one thread.
+    """
+    try:
+        with event.install_listener("numba:compile", _Refused()):
+            act()
+    except _NotKept:
+        if not _say_unkept.cache_info().currsize:
+            _in_child(act)
+        act()
+
+
+def _in_child(act: Callable[[], None]) -> None:
+    """Do `act` in a process of its own, and wait for its end, however it ends."""
+    child = os.fork()
+    if child:
+        os.waitpid(child, 0)
+    else:
+        try:
+            act()
+        finally:
+            os._exit(0)
 
 
 SPOILT = (

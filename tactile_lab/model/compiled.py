@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import zlib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -39,6 +40,14 @@ _LENT = {"_nrt": False}
 """Without numba's counting of owners, which then refuses to make an array."""
 
 
+@cache
+def _say_compiling() -> None:
+    """Say, once, that code is compiled."""
+    logging.getLogger(__name__).warning(
+        "Compiling for this computer, about 20 s; kept for every later run."
+    )
+
+
 class _FirstUse(event.Listener):
     """Says that code is compiled, once, and only where the disk has none of it."""
 
@@ -46,10 +55,7 @@ class _FirstUse(event.Listener):
 
     def on_start(self, _: Any) -> None:
         """Compiling begins."""
-        event.unregister(self.KIND, self)  # type: ignore[no-untyped-call]
-        logging.getLogger(__name__).warning(
-            "Compiling for this computer, about 20 s; kept for every later run."
-        )
+        _say_compiling()
 
     def on_end(self, _: Any) -> None:
         """Nothing to say."""

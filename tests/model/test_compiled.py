@@ -84,6 +84,46 @@ def test_a_cache_that_cannot_be_used_costs_only_time(tmp_path, monkeypatch):
         program.stdin.close()
 
 
+APART = """
+import os, sys
+from numba.core import caching
+import tactile_lab.model.compiled
+from tactile_lab.code_cache import compiled_apart, kept
+
+here = os.getpid()
+if "unwritable" in sys.argv:
+    caching.CacheImpl._locator_classes = []
+twice = kept(lambda x: 2 * x)
+real = twice._compiler.compile
+
+def compile(*arguments):
+    print("here" if os.getpid() == here else "apart", flush=True)
+    return real(*arguments)
+
+twice._compiler.compile = compile
+compiled_apart(lambda: print(twice(3.0), flush=True))
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="forks")
+def test_what_stays_for_days_has_a_child_compile(tmp_path, monkeypatch):
+    """All engines of a first day held the compiler, 130 MB in each."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    (tmp_path / "own.py").write_text(APART)
+
+    def done(*how):
+        return subprocess.run(
+            [sys.executable, tmp_path / "own.py", *how],
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+
+    assert done("unwritable").stdout == "here\n6.0\n", "nobody could keep it"
+    first = done()
+    assert first.stdout == "apart\n6.0\n6.0\n"
+    assert first.stderr.startswith("Compiling") and first.stderr.count("\n") == 1
+    assert done().stdout == "6.0\n"
+
+
 ALONE = """
 import sys
 from tactile_lab import simulate
