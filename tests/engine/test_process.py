@@ -37,7 +37,8 @@ def word(engine: Engine) -> str | None:
 
 
 def loaded(engine: Engine) -> bool:
-    return "sim_backend.bench" in sys.modules
+    runs = {"tactile_lab.engine.execution", "tactile_lab.store.stored_run"}
+    return runs | {"sim_backend.bench"} <= sys.modules.keys()
 
 
 @forks
