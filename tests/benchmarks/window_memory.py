@@ -17,6 +17,7 @@ from __future__ import annotations
 import argparse
 import os
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,7 +48,10 @@ def children(pid: int) -> list[int]:
 def row(bench: Bench, runs: int) -> str:
     """The table's row after so many runs."""
     session, own = bench.session, os.getpid()
-    sizes = {pid: set_sizes(pid) for pid in [own, *children(own)]}
+    sizes = {}
+    for pid in [own, *children(own)]:
+        with suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
+            sizes[pid] = set_sizes(pid)
     named = {own: "window", session.link.pid: "engine", session.desk.pid: "desk"}
     parts = dict.fromkeys(("window", "engine", "desk", "others"), 0.0)
     for pid, size in sizes.items():
