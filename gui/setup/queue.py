@@ -92,8 +92,9 @@ class QueueCard(QFrame):
             self.edited.emit(self.item)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Edit with Enter, take out with Delete."""
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+        """Edit with Enter, where no button has it; take out with Delete."""
+        enter = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+        if enter and QApplication.focusWidget() not in self.buttons.values():
             self.edited.emit(self.item)
         elif event.key() == Qt.Key.Key_Delete:
             self._take_out()

@@ -100,7 +100,10 @@ def test_moved_run_keeps_the_keyboard(lab) -> None:
     QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Space)
     assert [item.title for item in session.queue.items] == ["two", "one", "three"]
     assert lab.app.focusWidget() is window.setup.queue.cards[1].buttons["down"]
-    window.setup.queue.cards[1].setFocus()
+    QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Return)
+    assert [item.title for item in session.queue.items] == ["two", "three", "one"]
+    assert window.setup.subject.edited is None, "Enter is the button's, not the row's"
+    lab.until(window.setup.queue.cards[2].hasFocus)
     QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Delete)
     assert [item.title for item in session.queue.items] == ["two", "three"]
     idle(lab)
