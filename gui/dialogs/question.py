@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from gui.dialogs.overlay import Overlay
+from gui.interrupted import FIELDS
 from gui.look.icons import pixmap
 from gui.look.theme import Theme
 from gui.parts import label, line_edit, push, row, say, set_role
@@ -14,9 +15,15 @@ from tactile_lab.engine.events import PersonAsked
 from tactile_lab.errors import QuantityError
 from tactile_lab.quantity import show
 
+TYPING = " Tab goes to the buttons: what is typed on answers nothing."
+
 
 class QuestionCard(Overlay):
-    """Shown from the question until it is done or the run is stopped."""
+    """Shown from the question until it is done or the run is stopped.
+
+    It comes by itself: where somebody types in a field just then, no button of it gets
+    the keyboard, for the next space would say that the probes were moved.
+    """
 
     def __init__(self, window: QWidget, session: Session, theme: Theme) -> None:
         super().__init__(window, 490)
@@ -48,6 +55,7 @@ class QuestionCard(Overlay):
         if asked is None:
             self.hide()
             return
+        typing = isinstance(QApplication.focusWidget(), FIELDS)
         sign = "plug" if asked.current is None else "edit"
         self._sign.setPixmap(pixmap(sign, self._theme.tokens.accent, 28))
         self.text.setText(
@@ -61,11 +69,12 @@ class QuestionCard(Overlay):
         self.understood.setVisible(reads)
         self.before.setVisible(reads and bool(self._last))
         self.before.setText(f"Entered last: {self._last}.")
-        self.coil.setText(self._coil_words(asked.current))
+        said = TYPING if typing and not reads else ""
+        self.coil.setText(self._coil_words(asked.current) + said)
         self.entry.clear()
         self._judge()
         self.open()
-        (self.entry if reads else self.done).setFocus()
+        (self.entry if reads else self.card if typing else self.done).setFocus()
 
     def _coil_words(self, current: float | None) -> str:
         """What is true of the coil while the run waits."""
