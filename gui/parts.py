@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypeVar
 
-from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtCore import QPoint, QRectF, QSize, Qt
 from PySide6.QtGui import (
+    QKeyEvent,
     QPainter,
     QPaintEvent,
     QPalette,
@@ -15,6 +16,7 @@ from PySide6.QtGui import (
     QWheelEvent,
 )
 from PySide6.QtWidgets import (
+    QApplication,
     QBoxLayout,
     QButtonGroup,
     QComboBox,
@@ -36,6 +38,7 @@ from gui.look.icons import icon, pixmap
 from gui.look.theme import Theme
 from gui.look.tokens import DARK
 from gui.state import unmarked
+from gui.tab_order import bring_into_sight
 
 
 def label(text: str, role: str = "", *, wrap: bool = False) -> QLabel:
@@ -214,9 +217,29 @@ class Segments(QFrame):
         return self.group.checkedId()
 
 
+class _Page(QScrollArea):
+    """Has what has the keyboard in sight, too, after it has become lower."""
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Scroll to it, unless somebody has scrolled it away."""
+        super().resizeEvent(event)
+        has, inner = QApplication.focusWidget(), self.widget()
+        if has is not None and inner is not None and inner.isAncestorOf(has):
+            top = has.mapTo(self.viewport(), QPoint()).y()
+            if 0 <= top < event.oldSize().height():
+                bring_into_sight(has, self)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Leave to the window what would scroll sideways, where nothing is."""
+        if event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
+
+
 def scrolling(inner: QWidget) -> QScrollArea:
     """`inner` in a frameless area that scrolls up and down."""
-    area = QScrollArea()
+    area = _Page()
     area.setWidget(inner)
     area.setWidgetResizable(True)
     area.setFrameShape(QFrame.Shape.NoFrame)

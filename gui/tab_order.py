@@ -88,5 +88,13 @@ def reach(widget: QWidget, *, forward: bool = True) -> None:
     area = widget.parentWidget()
     while area is not None:
         if isinstance(area, QScrollArea):
-            area.ensureWidgetVisible(widget, 0, 8)
+            bring_into_sight(widget, area)
         area = area.parentWidget()
+
+
+def bring_into_sight(widget: QWidget, area: QScrollArea) -> None:
+    """Scroll to all of a widget, its ring too: Qt does to where one types in it."""
+    inner = area.widget()
+    if inner is not None:
+        place = widget.mapTo(inner, widget.rect().center())
+        area.ensureVisible(place.x(), place.y(), 0, widget.height() // 2 + 8)

@@ -8,7 +8,7 @@ from gui.dialogs.about_run import AboutRun
 from gui.dialogs.connect import Connect
 from gui.dialogs.help import Help
 from gui.menu import GearMenu
-from gui.tab_order import in_reading_order
+from gui.tab_order import in_reading_order, reach
 
 
 def names(root: QWidget) -> list[str]:
@@ -54,6 +54,27 @@ def test_tab_walks_forth_and_back_and_skips_what_is_locked(lab) -> None:
     lab.until(lambda: not window.setup.run.isEnabled())
     window.setup.buttons.queue.setFocus()
     assert press_tab(lab, back=True) is not window.setup.run
+
+
+def test_a_field_stays_in_sight_as_what_it_says_is_told(lab) -> None:
+    """Why its text cannot be used took the room in which it stood."""
+    window = lab.window
+    window.resize(1366, 728)
+    area = window.setup.tables.parentWidget().parentWidget().parentWidget()
+    fields = [field.focusProxy() for field in window.setup.form.fields]
+    reach(fields[0])
+    area.verticalScrollBar().setValue(0)
+    while lab.app.focusWidget() in fields[:-1] and not area.verticalScrollBar().value():
+        press_tab(lab)
+    seen = lab.app.focusWidget()
+    assert seen.visibleRegion().boundingRect() == seen.rect(), "all of its ring"
+    height = area.height()
+    window.setup._show_warnings(["Spikes are missed at this sample rate. " * 4])
+    lab.until(lambda: area.height() < height)
+    assert seen.visibleRegion().boundingRect() == seen.rect()
+    window.setup._show_warnings(())
+    window.resize(1720, 1080)
+    window.page.setFocus()
 
 
 def test_locking_what_has_the_keyboard_gives_it_to_no_button(lab) -> None:
