@@ -148,6 +148,8 @@ class Actions(QObject):
         None acts on what lies hidden below a card.
         """
         pressed, covered = _written(event), self._card() is not None
+        if pressed in ("Left", "Right") and _chooses():
+            return True  # at the end of the choices: nothing else moves by it
         for key in self.keys:
             if key.single and pressed in key.keys:
                 if covered and pressed not in IN_CARDS:
@@ -420,6 +422,12 @@ def _ask_menu() -> None:
         at, why = focus.rect().center(), QContextMenuEvent.Reason.Keyboard
         asked = QContextMenuEvent(why, at, focus.mapToGlobal(at))
         QApplication.sendEvent(focus, asked)
+
+
+def _chooses() -> bool:
+    """Whether the keyboard is at a choice of one, where arrows go to the next."""
+    focus = QApplication.focusWidget()
+    return isinstance(focus, QAbstractButton) and focus.group() is not None
 
 
 def _press() -> None:

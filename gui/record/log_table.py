@@ -5,8 +5,16 @@ from __future__ import annotations
 from html import escape
 
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QRect, Qt
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QResizeEvent
+from PySide6.QtGui import (
+    QAction,
+    QGuiApplication,
+    QKeyEvent,
+    QKeySequence,
+    QResizeEvent,
+)
 from PySide6.QtWidgets import QAbstractItemView, QTableView, QToolTip
+
+from gui.table_keys import is_the_windows
 
 ROW = 22
 """Height of a line of text, px: rows and viewport are multiples of it."""
@@ -62,6 +70,13 @@ class LogTable(QTableView):
         """Put the selected lines on the clipboard, one below the other."""
         rows = sorted(index.row() for index in self.selectionModel().selectedRows())
         QGuiApplication.clipboard().setText("\n".join(self._line(row) for row in rows))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Go from line to line."""
+        if is_the_windows(event):
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
 
     def updateGeometries(self) -> None:
         """Keep the viewport a multiple of a row."""

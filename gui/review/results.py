@@ -7,7 +7,7 @@ from html import escape
 
 import numpy as np
 from PySide6.QtCore import Qt, QTimer, Signal
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
+from PySide6.QtGui import QAction, QGuiApplication, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -46,6 +46,7 @@ from gui.review.live_plots import (
 )
 from gui.session.fit import SILENT, Fit, FittedRate
 from gui.session.steps import cells
+from gui.table_keys import is_the_windows
 from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial
@@ -77,6 +78,17 @@ SEVERAL = (
 )
 
 HEADINGS = ("Step", "Spikes", "First\nms", "Peak\nHz", "Final\nHz", "Fall\n%")
+
+
+class _Steps(QTableWidget):
+    """A table that is gone through line by line."""
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Leave to the window what moves no line."""
+        if is_the_windows(event):
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
 
 
 class ResultsView(QWidget):
@@ -125,7 +137,7 @@ class ResultsView(QWidget):
         self.tables = label("", "", wrap=True)
         self.tables.setTextFormat(Qt.TextFormat.RichText)
         self.tables.hide()
-        self.table = QTableWidget(0, len(HEADINGS))
+        self.table = _Steps(0, len(HEADINGS))
         self._facts = panel("card")
         self._facts_text = label("", "", wrap=True)
         column(self._facts, self._facts_text, margin=10)

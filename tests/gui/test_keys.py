@@ -123,6 +123,36 @@ def test_arrows_move_the_cursor_that_was_brought_last(lab, window) -> None:
     view.clear_cursors()
 
 
+def test_arrows_at_the_last_choice_move_nothing_else(lab, window) -> None:
+    """They went on to the lanes: one too many moved view, or cursor."""
+    view = window.centre.view
+    view.show_span(1.0, 1.0)
+    window.review.show_tab(3)
+    window.review.focus_tab()
+    assert press(lab, KEY.Key_Right).accessibleName() == "Tab Spikes"
+    assert view.start == 1.0
+    press(lab, KEY.Key_Left)
+    assert window.review.tab == 2 and view.start == 1.0
+
+
+@pytest.mark.parametrize("table", ["log", "steps"])
+def test_keys_act_from_a_table_too(lab, window, table: str) -> None:
+    """Qt searched the lines for each letter."""
+    view, results = window.centre.view, window.review.results
+    has = window.centre.log.table if table == "log" else results.table
+    window.centre.open_log()
+    results.table.show()
+    has.setFocus()
+    view.show_span(1.0, 1.0)
+    press(lab, KEY.Key_1)
+    assert view.cursors is not None and has.hasFocus()
+    view.clear_cursors()
+    press(lab, KEY.Key_Right)
+    assert view.start > 1.0
+    assert press(lab, KEY.Key_N) is window.centre.log.note
+    results.show_kind(fires=True)
+
+
 def test_a_lane_is_made_higher(lab, window) -> None:
     stack = window.centre.stack
     upper, lower = stack.visible_rows()[:2]
