@@ -23,6 +23,7 @@ from gui.parts import (
     stack,
     with_gutter,
 )
+from gui.session.log import Severity
 from gui.session.queue import Queued
 from gui.session.session import Session
 from gui.setup.buttons import Buttons
@@ -68,6 +69,7 @@ class SetupPanel(QFrame):
         self._session, self._theme = session, theme
         self._snapshot = Snapshot()
         self._in_progress = self._names = False
+        self._refused = ""
         self._once_planned: Callable[[], None] | None = None
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
@@ -156,7 +158,7 @@ class SetupPanel(QFrame):
 
     def start(self) -> None:
         """Run what the form says, as soon as that is planned."""
-        if not self._blocked() and self._is_planned(self.start):
+        if not self._is_refused(self._prevented) and self._is_planned(self.start):
             self._session.start(
                 self.request(), self.title, self._session.plan.expectation
             )
@@ -170,7 +172,7 @@ class SetupPanel(QFrame):
         """Have it follow the run in progress; an edited run is saved instead."""
         if self.subject.edited is not None:
             self.save()
-        elif not self._cannot_wait and self._is_planned(self.enqueue):
+        elif not self._is_refused(self._cannot_wait) and self._is_planned(self.enqueue):
             expectation = self._session.plan.expectation
             self._session.queue.add(Queued(self.title, self.request(), expectation))
 
@@ -194,7 +196,9 @@ class SetupPanel(QFrame):
     def save(self) -> None:
         """Replace the edited run's parameters, as soon as they are planned."""
         item, plan = self.subject.edited, self._session.plan.expectation
-        if item is None or self._unusable or not self._is_planned(self.save):
+        if item is None or self._is_refused(self._unusable):
+            return
+        if not self._is_planned(self.save):
             return
         assert plan is not None
         asked = self.title if self._names else item.title, self.request(), plan
@@ -221,6 +225,7 @@ class SetupPanel(QFrame):
     def render_snapshot(self, snapshot: Snapshot) -> None:
         """Say what the form shows, and why a button is off."""
         self._snapshot = snapshot
+        self._forget_refusal()
         busy = snapshot.state.in_run
         self._in_progress = busy and self._shows_run_in_progress()
         editing = self.subject.edited is not None
@@ -254,14 +259,35 @@ class SetupPanel(QFrame):
         """Why what stands in the fields cannot be used, "" if it can."""
         return self.form.problem or self.tables.problem
 
-    def _blocked(self) -> str:
-        """Why a run cannot start now, "" if it can."""
+    @property
+    def _prevented(self) -> str:
+        """Why a run cannot start, also once it is planned, "" if it can."""
         if self.subject.edited is not None:
             return "Save or cancel the changes to the queued run first."
-        problem = self._unusable
-        if not problem and self._session.plan.expectation is None:
-            problem = "The plan is being computed: a long run's takes seconds."
-        return run_problem(self._snapshot, form_problem=problem)
+        return run_problem(self._snapshot, form_problem=self._unusable)
+
+    def _blocked(self) -> str:
+        """Why a run cannot start now, "" if it can."""
+        unplanned = self._session.plan.expectation is None
+        wait = "The plan is being computed: a long run's takes seconds."
+        return self._prevented or (wait if unplanned else "")
+
+    def _is_refused(self, problem: str) -> bool:
+        """Whether something is in the way of what a key asks for: that is told.
+
+        A button is locked then, and its tool tip says why; a key has neither.
+        """
+        if problem:
+            self._refused = problem
+            self._session.log.tell(Severity.WARNING, "form", problem)
+        return bool(problem)
+
+    def _forget_refusal(self) -> None:
+        """What was in the way of a key is so no more."""
+        ways = (self._prevented, self._cannot_wait, self._unusable)
+        if self._refused and self._refused not in ways:
+            self._refused = ""
+            self._session.log.told.emit("")
 
     def _wait_on(self) -> None:
         """The plan is not there yet: say so, and nothing of the one before."""

@@ -153,6 +153,29 @@ def test_keys_act_from_a_table_too(lab, window, table: str) -> None:
     results.show_kind(fires=True)
 
 
+def test_a_key_that_can_do_nothing_says_why(lab, window) -> None:
+    """A locked button has a tool tip for that; who pressed a key was told nothing."""
+    field, notice = window.setup.form.fields[0], window.centre.notice
+    before = field.text
+    field.put("heavy")
+    field.changed.emit()
+    for key in (KEY.Key_R, KEY.Key_Return):
+        window.centre.say("")
+        press(lab, key, HELD.ControlModifier)
+        assert "heavy" in notice.text() and notice.isVisible()
+    field.put(before)
+    field.changed.emit()
+    assert not notice.isVisible(), "what was in the way has gone"
+    lab.session.plan.expectation = None  # as before the first: the key is remembered
+    press(lab, KEY.Key_R, HELD.ControlModifier)
+    lab.until(lambda: lab.session.state is WindowState.RUNNING)
+    press(lab, KEY.Key_R, HELD.ControlModifier)
+    assert "in progress" in notice.text() and notice.isVisible()
+    lab.until(lambda: lab.session.state is WindowState.READY)
+    assert not notice.isVisible()
+    lab.until(lambda: window.screen_.run is not None and lab.session.link.idle)
+
+
 def test_a_lane_is_made_higher(lab, window) -> None:
     stack = window.centre.stack
     upper, lower = stack.visible_rows()[:2]
