@@ -160,8 +160,9 @@ class Actions(QObject):
         return False
 
     def _all(self) -> list[Shortcut]:
-        panels = self.panels
+        panels, there = self.panels, self._there
         tools, view = panels.centre.tools, panels.centre.view
+        write_note = there(panels.centre.write_note)
         cross = panels.centre.stack.scene.toggle_crosshair
         form, stepped = panels.setup.form, panels.review.spikes.stepped.emit
         return [
@@ -192,22 +193,22 @@ class Actions(QObject):
             Shortcut("Ctrl+M", "Monitor the sensor", tools.monitor.click),
             Shortcut("Home", "Start of the run", self._home),
             Shortcut("End", "End of the run", lambda: view.set_follow(True)),
-            Shortcut("N", "Note", panels.centre.write_note),
-            Shortcut("Ctrl+N", "Note, from a field", panels.centre.write_note),
+            Shortcut("N", "Note", write_note),
+            Shortcut("Ctrl+N", "Note, from a field", write_note),
             Shortcut("Ctrl+O", "Open a scene", self.screen.ask_scene),
             Shortcut("Ctrl+Shift+O", "Open a run", self.screen.ask_run),
-            Shortcut("Ctrl+K", "Connect instruments", self.connect_dialog),
-            Shortcut("Ctrl+,", "Settings", self.show_preferences),
+            Shortcut("Ctrl+K", "Connect instruments", there(self.connect_dialog)),
+            Shortcut("Ctrl+,", "Settings", there(self.show_preferences)),
             Shortcut("Ctrl+Q", "Quit", self.window.close),
             Shortcut("Ctrl+S", "Save the scene", lambda: self.save_scene()),
             Shortcut("Ctrl+E", "Export the view", lambda: self.export_view()),
-            Shortcut("Ctrl+F", "Search runs", self._search),
-            Shortcut("Ctrl+I", "About the run: notes", self.runs.about_shown),
+            Shortcut("Ctrl+F", "Search runs", there(self._search)),
+            Shortcut("Ctrl+I", "About the run: notes", there(self.runs.about_shown)),
             Shortcut("F5", "Read the runs anew", self.screen.list_runs),
-            Shortcut("Ctrl+1", "Results", lambda: self._tab(0)),
-            Shortcut("Ctrl+2", "Runs", lambda: self._tab(1)),
-            Shortcut("Ctrl+3", "Manual", lambda: self._tab(2)),
-            Shortcut("Ctrl+4", "Spikes", lambda: self._tab(3)),
+            Shortcut("Ctrl+1", "Results", there(lambda: self._tab(0))),
+            Shortcut("Ctrl+2", "Runs", there(lambda: self._tab(1))),
+            Shortcut("Ctrl+3", "Manual", there(lambda: self._tab(2))),
+            Shortcut("Ctrl+4", "Spikes", there(lambda: self._tab(3))),
             Shortcut("Ctrl+Z", "Undo in the form", form.edits.undo, repeats=True),
             Shortcut(
                 "Ctrl+Y Ctrl+Shift+Z", "Redo in the form", form.edits.redo, repeats=True
@@ -227,9 +228,18 @@ class Actions(QObject):
             Shortcut(
                 "? F1",
                 "Help on the panel that has the keyboard, and shortcuts",
-                self._help_here,
+                there(self._help_here),
             ),
         ]
+
+    def _there(self, act: Callable[[], object]) -> Callable[[], None]:
+        """Act, and bring the window the keyboard: the lanes' own may have had it."""
+
+        def acted() -> None:
+            act()
+            self.window.activateWindow()
+
+        return acted
 
     def _enter(self, forward: bool) -> None:
         """Give the keyboard to a panel: fault, form, lanes, log, results, header.

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import QSettings, Qt
+from PySide6.QtGui import QKeySequence
 from PySide6.QtTest import QTest
 
 from gui.lanes_window import LanesWindow
@@ -76,6 +77,17 @@ def test_keys_act_there(lab, apart) -> None:
     QTest.keyClick(apart, Qt.Key.Key_Z)
     QTest.keyClick(apart, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
     assert lab.window.apart is None
+
+
+@pytest.mark.parametrize("key", ["N", "Ctrl+N", "Ctrl+F"])
+def test_what_a_key_puts_the_keyboard_into_is_typed_into(lab, apart, key) -> None:
+    """The field got it in a window that had not: each letter of a note was a key."""
+    typed = QKeySequence(key)[0]
+    QTest.keyClick(apart, typed.key(), typed.keyboardModifiers())
+    search, note = lab.window.review.runs.search, lab.window.centre.log.note
+    lab.until(lambda: lab.app.focusWidget() is (search if key == "Ctrl+F" else note))
+    assert lab.window.isActiveWindow()
+    lab.window.review.show_tab(0)
 
 
 def test_tab_reaches_stop_and_lanes_there(lab, apart) -> None:
