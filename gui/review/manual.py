@@ -124,6 +124,7 @@ class ManualView(QWidget):
             widget.setEnabled(on)
         if taken:  # who took the coil by a key wants to set it
             self.current.setFocus()
+            self.current.selectAll()
         if not on:
             self.current.setModified(False)
         self.check.setEnabled(idle and not on)

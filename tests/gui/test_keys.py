@@ -82,6 +82,7 @@ def test_arrows_move_the_slider_of_the_coil(lab, window) -> None:
     press(lab, KEY.Key_Return)
     lab.until(lambda: lab.session.manual.opened and manual.slider.isEnabled())
     assert lab.app.focusWidget() is manual.current, "not a button of the header"
+    assert manual.current.selectedText() == "0 mA", "what is typed replaces it"
     manual.slider.setFocus()
     for _ in range(3):
         press(lab, KEY.Key_Right)
