@@ -19,21 +19,19 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads are not forked
 
 def load() -> None:
     """Load what is needed to plan a run, to ask who is on a bench, and for spikes."""
-    import numpy as np
-
     from tactile_lab.code_cache import compiled_apart
     from tactile_lab.engine.jobs import bench_of, check
     from tactile_lab.engine.memory import share_heap, trim
     from tactile_lab.engine.request import Request
     from tactile_lab.errors import TactileLabError
-    from tactile_lab.spikes.detector import Detector
+    from tactile_lab.spikes.detector import compile_search
 
     share_heap()
 
     def use() -> None:
         with suppress(TactileLabError, OSError):  # told to whoever asks for it
             check(bench_of(Request("demo", (), "sim").load(), realtime=False))
-        Detector(threshold=1, hysteresis=1).feed(0, np.zeros(1, np.int16))
+        compile_search()
 
     compiled_apart(use)
     for module in RUNS:
