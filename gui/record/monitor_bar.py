@@ -10,7 +10,14 @@ from gui.lanes.lane import title_of
 from gui.parts import STRETCH, bar, column, filled, label, push, set_role
 from gui.plots.numbers import number
 from tactile_lab.engine.sensor import SensorState
-from tactile_lab.measurement import BETWEEN_SAMPLES
+from tactile_lab.measurement import BETWEEN_SAMPLES, TOO_FAST
+
+RATES = {
+    "": "Rate",
+    BETWEEN_SAMPLES: "Rate: spikes missed",
+    TOO_FAST: "Rate: too fast",
+}
+"""The title of the rate, by why there is none."""
 
 WIDE = 760
 """Width from which on there is room for all of it, px."""
@@ -70,15 +77,15 @@ class MonitorBar(QFrame):
         for name, text in (
             ("V_C1", _volts(now.V_C1)),
             ("V_C2", _volts(now.V_C2)),
-            ("Rate", f"{number(now.rate, 2)} Hz" if now.counted else "—"),
+            ("Rate", "—" if now.unrated else f"{number(now.rate, 2)} Hz"),
             (
                 "To the threshold",
                 "—" if distance is None else f"{number(1e3 * abs(distance), 0)} mV",
             ),
         ):
             self._values[name].setText(text)
-        self._rate.setText("Rate" if now.counted else "Rate: spikes missed")
-        self._rate.setToolTip("" if now.counted else BETWEEN_SAMPLES)
+        self._rate.setText(RATES[now.unrated])
+        self._rate.setToolTip(now.unrated)
         critical = f" {now.critical_V_C1:.3f} V"
         if distance is None:
             self.side.setText("opening the oscilloscope …")

@@ -6,6 +6,7 @@ holds the last minute; Record makes it a run. `tactile-lab monitor` does the sam
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -42,7 +43,7 @@ class LiveMonitor(LiveTask):
         super().__init__(link, status, log)
         self.source: LiveSource | None = None
         self.recording = False
-        self._critical = float("nan")
+        self._critical, self._fastest = float("nan"), math.inf
 
     def start(self, bench: str, overrides: tuple[str, ...] = ()) -> None:
         """Monitor the sensor on a bench ("sim" or a bench file)."""
@@ -62,6 +63,8 @@ class LiveMonitor(LiveTask):
         source = self.source
         if isinstance(event, Begun):
             self._critical = event.critical_V_C1
+            shortest = event.shortest_interval
+            self._fastest = 1 / shortest if shortest else math.inf
             self.source = LiveSource(None, event.newtons_per_ampere)
             self.source.simulated = event.simulated
             self.source.counted = event.counted
@@ -95,7 +98,9 @@ class LiveMonitor(LiveTask):
             rate = 1 / max(float(spikes[-1] - spikes[-2]), 1e-9)
         V_C1, V_C2 = source.mean("V_C1"), source.mean("V_C2")
         held = min(source.reach, KEPT)
-        return SensorState(self._critical, V_C1, V_C2, rate, held, source.counted)
+        return SensorState(
+            self._critical, V_C1, V_C2, rate, held, source.counted, self._fastest
+        )
 
     def _recorded(self, reply: Reply[Path]) -> None:
         self.recording = False

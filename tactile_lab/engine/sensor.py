@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+from tactile_lab.measurement import BETWEEN_SAMPLES, TOO_FAST
 
 KEPT = 60.0
 """How much a monitor holds for `record`, s."""
@@ -12,6 +15,13 @@ LONG_PARTS = ('protocol.duration="86400 s"', 'protocol.part="600 s"')
 
 SILENT = 2.0
 """Time without a spike after which the rate counts as 0, s."""
+
+SEEN = {
+    "": "",
+    BETWEEN_SAMPLES: " of spikes seen, not of all",
+    TOO_FAST: ", too fast for the circuit: raise the threshold",
+}
+"""What a rate is of."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +34,7 @@ class SensorState:
         rate: of the last two spikes, Hz; 0 where they are long ago.
         counted: whether all spikes are seen: none falls between two samples.
         held: how much `record` would keep, s.
+        fastest: the circuit fires less often, Hz.
     """
 
     critical_V_C1: float
@@ -32,6 +43,14 @@ class SensorState:
     rate: float = 0.0
     held: float = 0.0
     counted: bool = True
+    fastest: float = math.inf
+
+    @property
+    def unrated(self) -> str:
+        """Why the rate is not the circuit's, as of a trial; "" where it is."""
+        if not self.counted:
+            return BETWEEN_SAMPLES
+        return TOO_FAST if self.rate > self.fastest else ""
 
     @property
     def distance(self) -> float | None:
@@ -43,7 +62,7 @@ class SensorState:
         if self.V_C1 is None or self.distance is None:
             return "no V_C1 yet"
         side = "above threshold: silent" if self.distance > 0 else "below it: fires"
-        seen = "" if self.counted else " of spikes seen, not of all"
+        seen = SEEN[self.unrated]
         second = "" if self.V_C2 is None else f"  V_C2 {self.V_C2:.3f} V"
         return (
             f"V_C1 {self.V_C1:.3f} V, {1e3 * abs(self.distance):.0f} mV {side}{second}"

@@ -103,12 +103,17 @@ def test_a_scope_whose_clock_is_slow_is_watched_on(monkeypatch):
     assert np.ravel(spans) == pytest.approx([0.0, 20.0] * 3, abs=0.03)
 
 
-def test_a_rate_of_which_spikes_are_missed_is_told_as_one():
+def test_a_rate_that_is_not_the_circuits_is_told_as_such():
     """At 200 kS/s a sensor that fired at 6.2 Hz was told 3.1 Hz, by turns."""
     slow = "record.sample_rate=0.2 MS/s"
     overrides = (*FIRES, "protocol.duration=1 s")
-    for rate, said in ((slow, "of spikes seen, not of all"), (FIRES[2], "Hz")):
-        monitor = Monitor(load("monitor", (*overrides, rate)))
+    noise = "detect.threshold=4 mV", "detect.hysteresis=1 mV"
+    for how, said in (
+        ((slow,), "of spikes seen, not of all"),
+        (noise, "too fast for the circuit: raise the threshold"),
+        ((), "Hz"),
+    ):
+        monitor = Monitor(load("monitor", (*overrides, *how)))
         monitor.run()
         assert str(monitor.sensor).endswith(said)
 

@@ -1,5 +1,6 @@
 """Cards and bars in a window as small as a screen of 1280 x 720 at 150 % leaves."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -141,10 +142,13 @@ def lay(app, bar: QWidget) -> None:
 def test_the_bar_of_the_monitor_fits(app, host) -> None:
     bar = MonitorBar()
     bar.setParent(host)
-    state = SensorState(3.981, 4.346, 1.480, 7.25, held=60.0)
-    bar.show_sensor(state, recording=False)
-    lay(app, bar)
-    assert cut(bar) == [] and bar.record.isVisible()
+    known = SensorState(3.981, 4.346, 1.480, 7.25, held=60.0, fastest=700.0)
+    missed, fast = replace(known, counted=False), replace(known, rate=19_600.0)
+    for state, rate in ((known, "7.25 Hz"), (missed, "—"), (fast, "—")):
+        bar.show_sensor(state, recording=False)
+        lay(app, bar)
+        assert cut(bar) == [] and bar.record.isVisible()
+        assert f"Rate {rate}" in bar.words
 
 
 def test_the_bar_of_a_comparison_fits(lab, host) -> None:
