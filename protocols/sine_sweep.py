@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from tactile_lab.analysis.response import Gain, gain
+from tactile_lab.analysis.response import FEWEST, Gain, gain
 from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import Conclusion, Table
 from tactile_lab.errors import NotIdentifiableError
@@ -67,7 +67,7 @@ class SineSweep(ForceProtocol):
     count: int = Field(
         default=5, ge=1, le=1000, title="Frequencies", description="Frequencies"
     )
-    cycles: int = Field(default=2, ge=1, le=10_000, description="Cycles of each")
+    cycles: int = Field(default=2, ge=2, le=10_000, description="Cycles of each")
     settle: Pause | None = Field(
         default=None, description="Time at the bias first; six tau of the film if empty"
     )
@@ -148,6 +148,20 @@ class SineSweep(ForceProtocol):
         )
         found = _gains(run, self._by_label)
         expected = _gains(run, self._by_label, model=True)
+        labels, known = self._by_label, {g.frequency for g in found}
+        short = (
+            t
+            for t in run.results
+            if t.held is not None
+            and t.label in labels
+            and labels[t.label] not in known
+            and not run.left_range("V_C1", *t.held)
+        )
+        cut += tuple(
+            f"No gain at {t.label}: fewer than {FEWEST} cycles of it are left from "
+            "where the force is on its sine. Ask for more with protocol.cycles."
+            for t in short
+        )
         if not found:
             return Conclusion(missing=cut or ("No gain: no frequency was completed.",))
         said = [_summary(found)]

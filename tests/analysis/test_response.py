@@ -121,7 +121,9 @@ def test_a_pattern_of_codes_is_no_scatter_of_the_phase():
 
 
 def test_too_little_is_refused():
-    with pytest.raises(NotIdentifiableError, match="less than one cycle"):
-        gain(TIME[:50], np.sin(TIME[:50]), np.sin(TIME[:50]), 0.5)
+    for n in (0, 5, 50, 260):  # of 0.5 Hz: 1.3 cycles
+        cut = TIME[:n]
+        with pytest.raises(NotIdentifiableError, match=r"too few: 1\.4 cycles and 12"):
+            gain(cut, np.sin(np.pi * cut), np.sin(np.pi * cut - 0.7), 0.5)
     with pytest.raises(NotIdentifiableError, match="no cause"):
         gain(TIME, np.zeros_like(TIME), np.sin(TIME), 0.5)

@@ -10,6 +10,7 @@ from modelled_runs import modelled, pulse
 
 from protocols.calibrate_field import CalibrateField
 from protocols.force_check import ForceCheck
+from protocols.sine_sweep import SineSweep
 from tactile_lab.calibration import read_calibration
 from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.measurement import MeasuredTrial
@@ -200,6 +201,16 @@ def test_sine_sweep_gives_the_gain_of_small_forces():
         circuit.k_F * steep * resistance, rel=0.02
     )
     assert abs(found["phase_rad"]["value"]) == pytest.approx(np.pi, abs=0.2)
+
+
+def test_a_sine_that_cannot_be_told_from_drift_is_told_as_unknown():
+    """Of one cycle the model's own gain was told 0.7 V/N where it is 2.4."""
+    one = {"lowest": 0.5, "highest": 0.5, "count": 1}
+    told = find(swung(0.5, 0.005, cycles=1, label="0.5 Hz", **one))
+    assert not told.conclusion.values.get("V_C1_over_force")
+    assert told.missing[0].startswith("No gain at 0.5 Hz: fewer than 1.4 cycles")
+    with pytest.raises(ValueError, match="greater than or equal to 2"):
+        SineSweep(cycles=1)
 
 
 def test_a_sine_is_looked_at_with_its_frequency_and_not_with_its_label():
