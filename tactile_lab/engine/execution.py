@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -293,9 +294,11 @@ class Execution(Task[Executed]):
             accounted = runner.missing is None and runner.surplus is None
             produced = runner.intake.produced if accounted else None
             self._recorder.close(status, produced, **entries)
-        finally:
-            proof = write_certificate(self.folder.path)
-        return proof
+        except Exception:
+            with suppress(TactileLabError, OSError):  # what failed first is told
+                write_certificate(self.folder.path)
+            raise
+        return write_certificate(self.folder.path)
 
     def _program(self) -> Program:
         scene, needed = self.scene, self.needs

@@ -134,9 +134,18 @@ class RunFolder:
         return path
 
     def finish(self, status: Status, **entries: Any) -> None:
-        """Patch `run.json` for the last time and let go of the folder."""
+        """Patch `run.json` for the last time and let go of the folder.
+
+        Raises:
+            RecordingError: it cannot be written, and says still that the run goes on.
+        """
         try:
             self.update(status=status, ended=_iso(datetime.now()), **entries)
+        except RecordingError as error:
+            raise RecordingError(
+                f"{error} What was recorded is kept, as of a run that goes on: once "
+                "the folder can be written, run `tactile-lab recover` on it."
+            ) from error
         finally:
             self._log.close()
 

@@ -15,7 +15,9 @@ from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.planning.needs import needs
 from tactile_lab.scene.load import load
+from tactile_lab.store import folder
 from tactile_lab.store.columns import SampleColumn
+from tactile_lab.store.recover import recover
 from tactile_lab.store.verify import verify
 
 
@@ -184,6 +186,29 @@ def test_a_disk_that_fails_at_the_very_end_is_no_complete_run(
     assert ran.done.exit_code == 3
     assert "No space left" in ran.done.reason
     assert ran.stored().info["status"] == "faulted"
+
+
+def test_a_run_whose_end_cannot_be_noted_tells_how_it_is_closed(
+    run_scene, short, monkeypatch
+):
+    written = folder.write_text
+
+    def refuse(path, *how, **named):
+        if path.name == "run.json":
+            raise PermissionError(13, "Permission denied")
+        written(path, *how, **named)
+
+    def fail_last(execution, event):
+        if isinstance(event, events.StateChanged) and event.state == "stopping":
+            monkeypatch.setattr(folder, "write_text", refuse)
+
+    ran = run_scene(*short, watch=fail_last)
+    assert ran.done.exit_code == 3 and ran.done.off.verified
+    assert "Permission denied" in ran.done.reason
+    assert "run `tactile-lab recover` on it" in ran.done.reason
+    monkeypatch.setattr(folder, "write_text", written)
+    recover(ran.folder)
+    assert not verify(ran.folder).findings
 
 
 def test_a_mistake_after_the_run_does_not_hide_how_the_coil_was_left(
