@@ -43,6 +43,9 @@ QUIET = 2.0
 LEAVE = 60.0
 """Longest wait for tasks to end after the pipe's other end has gone, s."""
 
+LAST = 1.0
+"""Longest wait for what is just sent to it, s: it may be full, and nobody reads."""
+
 MOST_TASKS, MOST_QUESTIONS = 8, 64
 """Tasks that may be begun and not yet ended, one of which has the instruments; and
 questions that may wait for their answers. Each has threads of its own: whoever asks for
@@ -120,7 +123,11 @@ class Engine:
                 task.thread.join(LEAVE)
             self._said.put(None)
             said.join(LEAVE)
+            # not under an answer that is just sent, which would break on it
+            sent = self._sending.acquire(timeout=LAST)
             self._pipe.close()
+            if sent:
+                self._sending.release()
 
     def _next(self) -> Any:
         """What is asked next; memory is given back where nobody asks for a while."""

@@ -9,7 +9,9 @@ import threading
 import time
 import weakref
 from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import cast
 
 import pytest
 from engine_answers import answered, pid_of, size_of
@@ -281,3 +283,34 @@ def test_an_engine_gives_back_what_ended_tasks_left(
     ours.send(None)
     serving.join(60)
     assert left() is None
+
+
+class SlowPipe:
+    """Whoever is at its other end has gone; what is sent takes a while."""
+
+    def __init__(self) -> None:
+        self.begun, self.closed, self.sent = threading.Event(), False, 0
+
+    def recv(self) -> None:
+        raise EOFError
+
+    def send(self, what: object) -> None:
+        self.begun.set()
+        time.sleep(0.05)
+        assert not self.closed, "as multiprocessing's own breaks then"
+        self.sent += 1
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def test_an_engine_that_ends_lets_an_answer_be_sent_first() -> None:
+    """A thread broke on a pipe that was closed under it, as a window closed."""
+    pipe = SlowPipe()
+    engine = Engine(cast(Connection, pipe))
+    telling = threading.Thread(target=engine.tell, args=(1, Reply(None)))
+    telling.start()
+    assert pipe.begun.wait(5)
+    engine.serve()
+    telling.join()
+    assert pipe.closed and pipe.sent == 1
