@@ -199,6 +199,15 @@ class Segments(QFrame):
             button.setMinimumHeight(28)
             self.group.addButton(button, number)
             row.addWidget(button)
+        self.group.buttonToggled.connect(self._set_tab_stop)
+
+    def _set_tab_stop(self) -> None:
+        """Have Tab come to the choice that is made: Qt does once one had the focus."""
+        none = self.chosen < 0
+        for button in self.group.buttons():
+            comes = none or button.isChecked()
+            stop = Qt.FocusPolicy.TabFocus if comes else Qt.FocusPolicy.NoFocus
+            button.setFocusPolicy(stop)
 
     def choose(self, number: int) -> None:
         """Check one choice (-1: none) without telling anybody."""

@@ -8,6 +8,7 @@ from gui.dialogs.about_run import AboutRun
 from gui.dialogs.connect import Connect
 from gui.dialogs.help import Help
 from gui.menu import GearMenu
+from gui.parts import Segments
 from gui.tab_order import in_reading_order, reach
 
 
@@ -54,6 +55,20 @@ def test_tab_walks_forth_and_back_and_skips_what_is_locked(lab) -> None:
     lab.until(lambda: not window.setup.run.isEnabled())
     window.setup.buttons.queue.setFocus()
     assert press_tab(lab, back=True) is not window.setup.run
+
+
+def test_tab_comes_to_the_choice_that_is_made(lab) -> None:
+    """Of those between which arrows choose it came to the first, until one had it."""
+    segments = Segments(["1 s", "5 s", "Run"], "Visible time")
+    segments.setParent(lab.window)
+    segments.show()
+    stops = [names(segments)]
+    for chosen in (2, 1, -1):
+        segments.choose(chosen)
+        stops.append(names(segments))
+    segments.deleteLater()
+    every = [f"Visible time: {text}" for text in ("1 s", "5 s", "Run")]
+    assert stops == [every, every[2:], every[1:2], every]
 
 
 def test_a_field_stays_in_sight_as_what_it_says_is_told(lab) -> None:
