@@ -66,9 +66,9 @@ class _Refused(event.Listener):
 def compiled_apart(act: Callable[[], None]) -> None:
     """Do `act`, which may be begun twice; have a child compile what is not kept.
 
-    A compiler that has worked holds 60 MB until its process ends, and so does each that
-    is forked from it: too much for a process that is there for days. Where the disk
-    takes no code, it is compiled here. Forks: call it while there is one thread.
+    A compiler that has worked holds 130 MB until its process ends, and so does each
+    that is forked from it: too much for a process that is there for days. Where the
+    disk takes no code, it is compiled here. Forks: call it while there is one thread.
     """
     try:
         with event.install_listener("numba:compile", _Refused()):

@@ -185,7 +185,7 @@ def student_95(freedom: int) -> float:
     """Two-sided 95 % quantile of Student's t; at least one degree of freedom.
 
     By Newton's method on the integral of its density, which comes from below; within
-    1e-9 of SciPy's, whose special functions take 0.3 s and 17 MB to import.
+    1e-8 of SciPy's, whose special functions take 0.3 s and 17 MB to import.
     """
     import numpy as np
 
