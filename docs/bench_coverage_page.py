@@ -160,9 +160,11 @@ bound of either, which held, but was tried once.
 
 The bands of `force_check` and of the critical force (`threshold_search`, `_trim` and
 `_drift`) are what the bench file states of the force, and that alone decides: of the
-first thousand seeds 945 drew a force within its band, so they hold in 94.5 % whatever
-is done here. In the same way the lag decides over the latencies of `touch`. Numbers of
-one run hold or miss together.
+first thousand seeds 945 drew a force within its band, so they hold in 94.5 % and in
+what the resolution of a search adds to that. Over the latencies of `touch` the lag
+decides: they are told as if half the force came late by all of it, as it does after a
+slow onset; after a fast one it comes late by half of it. Numbers of one run hold or
+miss together.
 
 What `vibration` and `texture` tell has no row. Vector strengths and phases were those
 of the true sensor under the same presentations to 0.01 and 0.3 of their half-widths in
