@@ -14,6 +14,7 @@ from tactile_lab.analysis.charging import Charging
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.rate_force import RateLaw
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.equations import rest
 from tactile_lab.model.simulate import simulate
 from tactile_lab.report.identified import identify_run
 from tactile_lab.report.run_data import RunData
@@ -270,10 +271,8 @@ def drifting(run: RunData, values: dict[str, Any], true: Truth) -> Told:
 
 def watched(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     """How far V_C1 is from where the sensor fires, at rest."""
-    made = simulate(true.circuit, Waveform.constant(0.0), keep=("V_C1",), until=1.0)
-    at_rest = float(made.sample("V_C1", np.array([1.0]))[0])
     yield from around(
         "V_C1 to its critical", values.get("distance_to_threshold_V"),
         values.get("distance_to_threshold_uncertainty_V_95"),
-        at_rest - true.circuit.critical_V_C1,
+        rest(true.circuit).V_C1 - true.circuit.critical_V_C1,
     )  # fmt: skip
