@@ -141,29 +141,19 @@ class SineSweep(ForceProtocol):
         """Gain and phase of V_C1 per frequency, and how far the model's gain is off."""
         if run.trace("V_C1") is None:
             return Conclusion(missing=("No gain: V_C1 was not recorded.",))
-        cut = tuple(
-            f"No gain at {t.label}: V_C1 left its channel's range."
+        labels = self._by_label
+        found = _gains(run, labels)
+        expected = _gains(run, labels, model=True)
+        known = {g.frequency for g in found}
+        missing = tuple(
+            f"No gain at {t.label}: {_why_none(run, t.held)}"
             for t in run.results
-            if t.held is not None and run.left_range("V_C1", *t.held)
-        )
-        found = _gains(run, self._by_label)
-        expected = _gains(run, self._by_label, model=True)
-        labels, known = self._by_label, {g.frequency for g in found}
-        short = (
-            t
-            for t in run.results
-            if t.held is not None
-            and t.label in labels
-            and labels[t.label] not in known
-            and not run.left_range("V_C1", *t.held)
-        )
-        cut += tuple(
-            f"No gain at {t.label}: fewer than {FEWEST} cycles of it are left from "
-            "where the force is on its sine. Ask for more with protocol.cycles."
-            for t in short
+            if t.held is not None and t.label in labels
+            if labels[t.label] not in known
         )
         if not found:
-            return Conclusion(missing=cut or ("No gain: no frequency was completed.",))
+            none = ("No gain: no frequency was completed.",)
+            return Conclusion(missing=missing or none)
         said = [_summary(found)]
         said += run.not_stated
         beside = {e.frequency: e for e in expected}
@@ -186,7 +176,7 @@ class SineSweep(ForceProtocol):
             note="± are 95 % intervals; the model's are of the same force.",
         )
         return Conclusion(
-            tuple(said), {"V_C1_over_force": values}, cut, tables=(table,)
+            tuple(said), {"V_C1_over_force": values}, missing, tables=(table,)
         )
 
     def plots(self, run: Measurement) -> Iterator[Plot]:
@@ -293,6 +283,16 @@ def _gains(
             continue  # it was cut short
         found.append(answer if model else _known(run, trial, answer))
     return found
+
+
+def _why_none(run: Measurement, held: tuple[float, float]) -> str:
+    """Why there is no gain of a trial, held from and to, s."""
+    if run.left_range("V_C1", *held):
+        return "V_C1 left its channel's range."
+    return (
+        f"fewer than {FEWEST} cycles of it are left from where the force is on its "
+        "sine. Ask for more with protocol.cycles."
+    )
 
 
 def _summary(found: Sequence[Gain]) -> str:
