@@ -6,7 +6,6 @@ holds the last minute; Record makes it a run. `tactile-lab monitor` does the sam
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -43,7 +42,7 @@ class LiveMonitor(LiveTask):
         super().__init__(link, status, log)
         self.source: LiveSource | None = None
         self.recording = False
-        self._critical, self._fastest = float("nan"), math.inf
+        self._critical = float("nan")
 
     def start(self, bench: str, overrides: tuple[str, ...] = ()) -> None:
         """Monitor the sensor on a bench ("sim" or a bench file)."""
@@ -63,11 +62,10 @@ class LiveMonitor(LiveTask):
         source = self.source
         if isinstance(event, Begun):
             self._critical = event.critical_V_C1
-            shortest = event.shortest_interval
-            self._fastest = 1 / shortest if shortest else math.inf
             self.source = LiveSource(None, event.newtons_per_ampere)
             self.source.simulated = event.simulated
             self.source.counted = event.counted
+            self.source.shortest_interval = event.shortest_interval
             self.begun.emit(self.source)
         elif source is not None and isinstance(event, Samples):
             source.add_bins(event.bins)
@@ -99,7 +97,13 @@ class LiveMonitor(LiveTask):
         V_C1, V_C2 = source.mean("V_C1"), source.mean("V_C2")
         held = min(source.reach, KEPT)
         return SensorState(
-            self._critical, V_C1, V_C2, rate, held, source.counted, self._fastest
+            self._critical,
+            V_C1,
+            V_C2,
+            rate,
+            held,
+            source.counted,
+            source.shortest_interval,
         )
 
     def _recorded(self, reply: Reply[Path]) -> None:

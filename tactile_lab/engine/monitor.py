@@ -9,7 +9,6 @@ folder = monitor.record("runs")          # the last 60 s as a run
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Mapping
 from pathlib import Path
@@ -96,11 +95,11 @@ class Monitor(Task[Ending]):
         self._search = SpikeSearch.of(scene, needed.detect_on)
         self.counted = not misses_spikes(scene, needed)
         self._last = (float("-inf"), 0.0)
-        self._fastest = math.inf
+        self._shortest_interval = 0.0
         if self._search is not None:
             from tactile_lab.model.equations import shortest_interval
 
-            self._fastest = 1 / shortest_interval(scene.circuit)
+            self._shortest_interval = shortest_interval(scene.circuit)
         self._recording = threading.Lock()
         self._runner = Runner(
             Program(
@@ -143,7 +142,7 @@ class Monitor(Task[Ending]):
             rate if reach - when < SILENT else 0.0,
             min(reach, self._ring.length),
             self.counted,
-            self._fastest,
+            self._shortest_interval,
         )
 
     def record(self, out: Path | str, notes: Mapping[str, str] | None = None) -> Path:

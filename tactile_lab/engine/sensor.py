@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from tactile_lab.measurement import BETWEEN_SAMPLES, TOO_FAST
@@ -34,7 +33,7 @@ class SensorState:
         rate: of the last two spikes, Hz; 0 where they are long ago.
         counted: whether all spikes are seen: none falls between two samples.
         held: how much `record` would keep, s.
-        fastest: the circuit fires less often, Hz.
+        shortest_interval: less than any between two spikes of the sensor, s.
     """
 
     critical_V_C1: float
@@ -43,14 +42,14 @@ class SensorState:
     rate: float = 0.0
     held: float = 0.0
     counted: bool = True
-    fastest: float = math.inf
+    shortest_interval: float = 0.0
 
     @property
     def unrated(self) -> str:
         """Why the rate is not the circuit's, as of a trial; "" where it is."""
         if not self.counted:
             return BETWEEN_SAMPLES
-        return TOO_FAST if self.rate > self.fastest else ""
+        return TOO_FAST if self.rate * self.shortest_interval > 1 else ""
 
     @property
     def distance(self) -> float | None:

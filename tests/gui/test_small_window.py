@@ -142,7 +142,7 @@ def lay(app, bar: QWidget) -> None:
 def test_the_bar_of_the_monitor_fits(app, host) -> None:
     bar = MonitorBar()
     bar.setParent(host)
-    known = SensorState(3.981, 4.346, 1.480, 7.25, held=60.0, fastest=700.0)
+    known = SensorState(3.981, 4.346, 1.480, 7.25, held=60.0, shortest_interval=1.4e-3)
     missed, fast = replace(known, counted=False), replace(known, rate=19_600.0)
     for state, rate in ((known, "7.25 Hz"), (missed, "—"), (fast, "—")):
         bar.show_sensor(state, recording=False)
