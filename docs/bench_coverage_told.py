@@ -237,8 +237,8 @@ def touches(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     for found, truth in zip(values["touches"], truly, strict=True):
         name = f"latency, {1e3 * found['onset_s']:.0f} ms"
         if truth["latency_s"] is not None:
-            half = run.force_timing
-            yield from around(name, found["latency_s"], half, truth["latency_s"])
+            told = found["latency_s"], found["latency_uncertainty_s_95"]
+            yield from around(name, *told, truth["latency_s"])
 
 
 def concluded(run: RunData) -> dict[str, Any]:

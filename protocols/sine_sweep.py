@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -346,11 +347,14 @@ def _degrees(phase: float) -> float:
 
 
 def _known(run: Measurement, trial: MeasuredTrial, found: Gain) -> Gain:
-    """The force's uncertainty on the gain, that of clocks and lag on the phase."""
-    size, phase = found.gain, found.phase
+    """Force and lag on the gain, clocks and lag on the phase."""
+    size, phase, late = found.gain, found.phase, run.turned(found.frequency)
     if run.force_uncertainty is not None:
         part = float(run.force_uncertainty.of(found.amplitude)) / found.amplitude
         size = size.widened(size.value * part)
-    late = trial.clock_uncertainty or 0.0, run.lag_uncertainty or 0.0
-    phase = phase.widened(*(2 * math.pi * found.frequency * time for time in late))
-    return replace(found, gain=size, phase=phase)
+    clock = 2 * math.pi * found.frequency * (trial.clock_uncertainty or 0.0)
+    return replace(
+        found,
+        gain=size.widened(size.value * (1 / abs(late) - 1)),
+        phase=phase.widened(clock, cmath.phase(late)),
+    )

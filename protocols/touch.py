@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from tactile_lab.analysis.spike_train import within
+from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion, Table
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
@@ -31,6 +33,7 @@ class Touched:
         asked: onset asked for, s.
         took: time from 10 % to 90 % of the force as applied, s.
         latency: from half the force to the first spike, s; None without one.
+        timing: half of the band in which half the force is dated, s, 95 %.
         spikes: during onset and hold.
         fastest: rate of the shortest interval, Hz; None below two spikes.
     """
@@ -38,6 +41,7 @@ class Touched:
     asked: float
     took: float
     latency: float | None
+    timing: float
     spikes: int
     fastest: float | None
 
@@ -86,26 +90,24 @@ class Touch(ForceProtocol):
         found = self.touches(run)
         if not found:
             return Conclusion(missing=("No touch was completed.",))
-        known = run.clock_uncertainty is not None
-        # half of the force comes as late as the field lags
-        half = run.force_timing if known else 0.0
         stated = "lags" if run.lag_uncertainty else "lags of the force not stated"
-        timed = f" (95 %: clocks, {stated})" if known else ""
+        timed = "" if run.clock_uncertainty is None else f" (95 %: clocks, {stated})"
         rows = tuple(self._row(onset, found) for onset in self.onsets)
         answered = [one for one in found if one.latency is not None]
         said: tuple[str, ...] = ()
         if answered:
             first = min(answered, key=lambda one: one.latency or 0.0)
+            latency = plus_minus(first.latency or 0.0, first.timing, "s")
             said = (
-                "The shortest latency is "
-                f"{plus_minus(first.latency or 0.0, half, 's')} after half the force"
-                f"{timed}, at an onset of {show(first.asked, 's')}.",
+                f"The shortest latency is {latency} after half the force{timed}, at an "
+                f"onset of {show(first.asked, 's')}.",
             )
         values = [
             {
                 "onset_s": one.asked,
                 "onset_10_90_s": one.took,
                 "latency_s": one.latency,
+                "latency_uncertainty_s_95": one.timing or None,
                 "spikes": one.spikes,
                 "fastest_Hz": one.fastest,
             }
@@ -137,6 +139,7 @@ class Touch(ForceProtocol):
                         Series(
                             x=[one.took for one in found],
                             y=[one.latency or 0.0 for one in found],
+                            y_error=[one.timing for one in found],
                             mark="points", colour="V_C1",
                         ),
                     ),
@@ -194,21 +197,29 @@ def _touched(
     run: Measurement, trial: MeasuredTrial, asked: float, hold: tuple[float, float]
 ) -> Touched:
     """One touch, its times taken from the force that was applied."""
+    aligned = run.clock_uncertainty
     time = trial.start + np.linspace(-0.05, hold[0] + 0.1, 8000)
-    force = run.force.at(time)
+    force = Waveform(time, run.force.at(time))
     level = float(run.force.at(trial.start + (hold[0] + hold[1]) / 2))
-    low, half, high = (
-        float(time[np.argmax(np.abs(force) >= part * abs(level))])
-        for part in (LOW, 0.5, HIGH)
-    )
+    low, half, high = (_reached(force, time, part * level) for part in (LOW, 0.5, HIGH))
+    late = _reached(run.late(force), time, 0.5 * level) - half
     spikes = within(trial.spike_times, (half - trial.start, hold[1]))
     return Touched(
         asked=asked,
         took=high - low,
         latency=float(spikes[0] + trial.start - half) if spikes.size else None,
+        timing=math.hypot(aligned, late) if aligned else 0.0,
         spikes=int(spikes.size),
         fastest=float(1 / np.diff(spikes).min()) if spikes.size > 1 else None,
     )
+
+
+def _reached(force: Waveform, time: FloatArray, level: float) -> float:
+    """When it first comes as far as `level`, N, to either side, s."""
+    size = np.abs(force.at(time))
+    after = max(int(np.argmax(size >= abs(level))), 1)
+    pair = slice(after - 1, after + 1)
+    return float(np.interp(abs(level), size[pair], time[pair]))
 
 
 def _range(values: list[float], unit: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -233,8 +234,9 @@ def _phases(run: Measurement, frequency: float, trial: MeasuredTrial) -> FloatAr
 
 def _phase_half(run: Measurement, frequency: float, one: PhaseLocking) -> float:
     """Half of the 95 % interval of a phase, rad: its scatter, clocks and lag."""
-    late = 2 * math.pi * frequency * run.force_timing
-    return min(math.hypot(one.phase_half, late), math.pi)
+    clock = 2 * math.pi * frequency * (run.clock_uncertainty or 0.0)
+    late = cmath.phase(run.turned(frequency))
+    return min(math.hypot(one.phase_half, clock, late), math.pi)
 
 
 def _row(run: Measurement, frequency: float, one: PhaseLocking) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ Between two points of a piecewise-linear u both are straight lines and exponenti
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -157,6 +158,23 @@ class Lag:
             ends.append(z)
         first, second = np.array(sizes).reshape(-1, 2).T
         return (first, second), np.array(ends), (y, z)
+
+    def late(self, wave: Waveform, later: float) -> Waveform:
+        """The field, or what is in proportion to it, if the core lags by more.
+
+        Args:
+            wave: the field as it follows by these lags; as if its first value had been
+                held for ever.
+            later: by so much, s, above 0.
+        """
+        eddy = self.eddy + later
+        behind, _ = Lag(eddy=eddy).follow(wave)
+        return wave.scaled(self.eddy / eddy).plus(behind.scaled(later / eddy))
+
+    def turned(self, frequency: float, later: float) -> complex:
+        """A sine of the field if the core lags by `later` s more, over what it is."""
+        turn = 2j * math.pi * frequency
+        return (1 + turn * self.eddy) / (1 + turn * (self.eddy + later))
 
     def led(self, wave: Waveform, fine: float) -> Waveform:
         """What the source must be set to that the field follows `wave`, A.

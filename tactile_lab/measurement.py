@@ -22,6 +22,7 @@ from tactile_lab.analysis.spike_train import Response, respond
 from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import GEOMETRY_NOT_STATED, NOT_STATED
 from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.lag import Lag
 from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.quantity import count
@@ -209,8 +210,9 @@ class Measurement:
         listed: whether the current was played as a waveform, not as set-points.
         displaced: by cause, "follower" or "temperature", the circuit with what is not
             known of it at the end of its 95 % band.
-        lag_uncertainty: the same of the lags of coil and core together, s; None where
-            the bench does not state it.
+        lag: of the force behind the set-point.
+        lag_uncertainty: half of the 95 % band of both of its lags together, s; None
+            where the bench does not state it.
         searched: whether spikes were looked for.
         settings: settings read back, by instrument, then by name.
         conditions: temperature, operator, sensor and notes, as text by name.
@@ -234,6 +236,7 @@ class Measurement:
     circuit: Circuit | None = None
     displaced: Mapping[str, Circuit] = dataclasses.field(default_factory=dict)
     listed: bool = False
+    lag: Lag = dataclasses.field(default_factory=Lag)
     lag_uncertainty: float | None = None
     searched: bool = True
     settings: Mapping[str, Mapping[str, str]] = dataclasses.field(default_factory=dict)
@@ -256,13 +259,17 @@ class Measurement:
         known = [t.clock_uncertainty for t in self.results if t.clock_uncertainty]
         return max(known, default=None)
 
-    @property
-    def force_timing(self) -> float:
-        """Half of the 95 % band in which spikes are timed against the force, s.
+    def late(self, force: Waveform) -> Waveform:
+        """Some of the force if its lags are at the end of their 95 % band, N.
 
-        What is not known of clocks and lags is not in it.
+        As it is where the bench does not state how well they are known.
         """
-        return math.hypot(self.clock_uncertainty or 0.0, self.lag_uncertainty or 0.0)
+        later = self.lag_uncertainty
+        return self.lag.late(force, later) if later else force
+
+    def turned(self, frequency: float) -> complex:
+        """A sine of that force over the force believed, at a frequency in Hz."""
+        return self.lag.turned(frequency, self.lag_uncertainty or 0.0)
 
     def circuit_adaptation(
         self, trial: MeasuredTrial

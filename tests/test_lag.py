@@ -24,6 +24,7 @@ def stepped(lag, wave, end, step=2e-6):
 STAIRS = Waveform.through(
     [(0, 0), (0.01, 0), (0.01, 0.5), (0.03, 0.5), (0.05, 1.0), (0.052, -0.2), (0.2, 0)]
 )
+AT = np.linspace(0.0, 0.2, 20001)
 
 
 @pytest.mark.parametrize(
@@ -33,6 +34,21 @@ def test_ramps_and_steps_are_followed_as_the_equations_say(lag):
     found, _ = lag.follow(STAIRS)
     times, field = stepped(lag, STAIRS, 0.2)
     assert np.abs(found.at(times) - field).max() < 2e-3
+
+
+@pytest.mark.parametrize(("lag", "later"), [(Lag(1e-3, 3e-3), 1e-3), (Lag(), 2e-3)])
+def test_what_is_followed_later_is_what_a_longer_lag_follows(lag, later):
+    longer = Lag(lag.coil, lag.eddy + later)
+    found = lag.late(lag.follow(STAIRS)[0], later)
+    assert np.abs(found.at(AT) - longer.follow(STAIRS)[0].at(AT)).max() < 4 * FINE
+    turn, f = np.exp(2j * np.pi * 40 * AT), 40.0
+    sine = Waveform(AT, turn.imag)
+    settled = AT > 0.05
+    one, other = (
+        np.vdot(turn[settled], each.follow(sine)[0].at(AT[settled]))
+        for each in (lag, longer)
+    )
+    assert lag.turned(f, later) == pytest.approx(other / one, abs=2e-3)
 
 
 def test_lags_that_are_alike_are_told_by_their_sum():

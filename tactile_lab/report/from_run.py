@@ -84,6 +84,7 @@ def read(folder: Path, progress: Progress = nothing) -> RunData:
             counted=samples_catch_spikes(run),
             displaced=scene.displaced,
             listed=played(run),
+            lag=scene.bench.magnet.lag,
             lag_uncertainty=scene.bench.magnet.lag_uncertainty,
             searched=bool({"spikes", "rate"} & set(scene.record.signals)),
             start=scene.start,
