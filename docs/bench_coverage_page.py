@@ -162,9 +162,7 @@ The bands of `force_check` and of the critical force (`threshold_search`, `_trim
 `_drift`) are what the bench file states of the force, and that alone decides: of the
 first thousand seeds 945 drew a force within its band, so they hold in 94.5 % and in
 what the resolution of a search adds to that. Over the latencies of `touch` the lag
-decides: they are told as if half the force came late by all of it, as it does after a
-slow onset; after a fast one it comes late by half of it. Numbers of one run hold or
-miss together.
+decides alike. Numbers of one run hold or miss together.
 
 What `vibration` and `texture` tell has no row. Vector strengths and phases were those
 of the true sensor under the same presentations to 0.01 and 0.3 of their half-widths in

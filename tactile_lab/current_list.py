@@ -87,7 +87,7 @@ class ListCapability:
         points = max(1, int(reached[-1] * (1 + 1e-12)))
         edges = np.interp(np.linspace(0, reached[-1], points + 1), reached, wave.time)
         edges = np.round(edges / self.resolution) * self.resolution
-        means = np.diff(_integral(wave, edges)) / np.diff(edges)
+        means = np.diff(wave.integral(edges)) / np.diff(edges)
         currents = np.append(np.round(means, digits) + 0.0, 0.0)
         dwells = np.append(np.diff(edges), self.shortest)
         return CurrentList(
@@ -136,6 +136,13 @@ class CurrentList:
         point = np.searchsorted(self.starts, t, side="right") - 1
         return np.where(point < 0, 0.0, self.currents[np.clip(point, 0, None)])
 
+    @property
+    def wave(self) -> Waveform:
+        """The currents one after the other, from 0 A, against s from its start."""
+        time = np.append(-self.duration, self.starts)
+        steps = np.column_stack([time, np.append(0.0, self.currents)])
+        return Waveform.stairs(steps, self.duration)
+
     def mean(self, start: FloatArray, width: float) -> FloatArray:
         """Mean current, A, over `width` s from each `start` (s after its start)."""
         knots = np.append(self.starts, self.duration)
@@ -156,12 +163,3 @@ class CurrentList:
             and np.array_equal(self.currents, other.currents)
             and np.array_equal(self.dwells, other.dwells)
         )
-
-
-def _integral(wave: Waveform, time: FloatArray) -> FloatArray:
-    """Integral of `wave` from its start to each `time`, in its unit times s."""
-    pieces = np.diff(wave.time) * (wave.value[1:] + wave.value[:-1]) / 2
-    until = np.concatenate([[0.0], np.cumsum(pieces)])
-    k = np.clip(np.searchsorted(wave.time, time, side="right") - 1, 0, None)
-    within = (time - wave.time[k]) * (wave.value[k] + wave.at(time)) / 2
-    return np.asarray(until[k] + within)

@@ -167,6 +167,23 @@ class Waveform:
         )
         return value
 
+    def integral(self, time: ArrayLike) -> FloatArray:
+        """Integral from the first point to `time` (any shape, s), in its unit times s.
+
+        Before and after its points it holds its first and last value.
+        """
+        t = np.asarray(time, dtype=np.float64)
+        pieces = np.diff(self.time) * (self.value[1:] + self.value[:-1]) / 2
+        until = np.concatenate([[0.0], np.cumsum(pieces)])
+        k = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, None)
+        within = (t - self.time[k]) * (self.value[k] + self.at(t)) / 2
+        return np.asarray(until[k] + within)
+
+    def mean(self, start: FloatArray, width: float) -> FloatArray:
+        """Mean over `width` s from each `start`, s."""
+        whole = self.integral(start + width) - self.integral(start)
+        return np.asarray(whole / width)
+
     def pieces(self, points: int) -> Iterator[Waveform]:
         """Consecutive parts that begin with the point the one before ends with.
 

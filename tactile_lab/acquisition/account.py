@@ -251,16 +251,20 @@ class Account:
             self.edges.extend(found)
 
     def note_list(
-        self, played: PlayedList, shunt: Trace | None, lag: float, code: float = 0.0
+        self,
+        played: PlayedList,
+        shunt: Trace | None,
+        coil_lag: float,
+        code: float = 0.0,
     ) -> None:
         """A list has been played: find it in the binned coil current, where there is.
 
-        Its points are written down as the samples show them, `lag` s before. One code
-        of that current is `code` A.
+        Its points are written down as the samples show them behind L/R of the coil,
+        `coil_lag` s. One code of that current is `code` A.
         """
         seen = None
         if self._origin is not None and shunt is not None:
-            seen = find_list(played, self._origin, shunt)
+            seen = find_list(played, self._origin, shunt, coil_lag)
         if seen is None:
             self.write_current()
         elif seen.unlike > MOST_UNLIKE:
@@ -271,7 +275,7 @@ class Account:
                 "Check the shunt's wiring, and the source's list mode."
             )
         else:
-            self.write_current(seen.edge.sampled - self.axis(played.began) - lag)
+            self.write_current(seen.edge.sampled - self.axis(played.began))
             self.edges.append(seen.edge)
             if not played.whole:
                 return

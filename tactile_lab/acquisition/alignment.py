@@ -13,8 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactile_lab.acquisition.coil_thread import Applied, PlayedList
+from tactile_lab.analysis.delay import delay
 from tactile_lab.arrays import FloatArray
 from tactile_lab.current_list import CurrentList
+from tactile_lab.errors import NotIdentifiableError
+from tactile_lab.lag import Lag
 from tactile_lab.scope import CLOCK_ERROR
 from tactile_lab.trace import Trace
 
@@ -32,6 +35,9 @@ SEARCH = 0.02
 
 SHIFT = 5e-4
 """Step in which the place of a list is looked for, s."""
+
+ROUNDS = 3
+"""So often what is left of its delay is put right, each time to first order."""
 
 CLUSTER = 20
 """Edges at either end of a segment that fix the clocks there."""
@@ -127,7 +133,7 @@ class SeenList:
     """A list of currents, as the samples show it.
 
     Attributes:
-        edge: where it began, on both clocks.
+        edge: when it began, on both clocks.
         unlike: part of the current's variance that the list does not account for.
         longer: by how much its second half came later than its first, s.
         scale: the current that was seen as a part of the list's.
@@ -139,13 +145,19 @@ class SeenList:
     scale: float
 
 
-def find_list(played: PlayedList, zero: float, shunt: Trace) -> SeenList | None:
+def find_list(
+    played: PlayedList, zero: float, shunt: Trace, coil_lag: float = 0.0
+) -> SeenList | None:
     """Where the binned coil current shows a list; None where it moves too little.
+
+    It is found as if the current came as it is set, but late, and then placed so that
+    the current is that of the list behind the coil's L/R.
 
     Args:
         played: the list.
         zero: clock time of run time 0, s.
         shunt: coil current, A, on the run's axis.
+        coil_lag: L/R of the coil, s.
     """
     points, began = played.points, played.began - zero
     if float(np.std(points.currents)) < SMALLEST:
@@ -159,11 +171,26 @@ def find_list(played: PlayedList, zero: float, shunt: Trace) -> SeenList | None:
         return None
     shift, unlike = _best(points, began, inside, shifts)
     latest = played.latest - zero + COIL_LAG
-    edge = Edge(began + shift, played.earliest - zero, latest)
+    placed = _placed(points, inside, began + shift, coil_lag)
+    edge = Edge(placed, played.earliest - zero, latest)
     asked = points.mean(inside.time - began - shift, inside.width)
     seen = inside.mean.astype(np.float64)
     scale = float(np.cov(asked, seen)[0, 1] / (np.var(asked, ddof=1) or 1.0))
     return SeenList(edge, unlike, _longer(points, began + shift, inside), scale)
+
+
+def _placed(points: CurrentList, seen: Trace, late: float, coil_lag: float) -> float:
+    """When a list began, s, which would have at `late` if its current came as set."""
+    flow, _ = Lag(coil=coil_lag).follow(points.wave)
+    bins, mean = seen.time, seen.mean.astype(np.float64)
+    began = late - coil_lag
+    for _ in range(ROUNDS):
+        try:
+            began += delay(flow, bins - began, seen.width, mean).value
+        except NotIdentifiableError:
+            break
+    near = abs(began - late + coil_lag) < 2 * SHIFT
+    return began if near else late - coil_lag
 
 
 def _longer(points: CurrentList, began: float, seen: Trace) -> float:

@@ -16,13 +16,13 @@ from tactile_lab.planning.timeline import Timeline
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.store.applied import (
-    BIN_TIME,
     ENOUGH,
     TOO_NOISY,
     VISIBLE,
     VISIBLE_CODES,
     edge_band,
 )
+from tactile_lab.store.shunt import BIN_TIME
 
 
 def clocks(scene: Scene, needed: Needs, drive: Timeline) -> Iterator[str]:

@@ -6,8 +6,9 @@ import numpy as np
 
 from tactile_lab.analysis.estimate import Estimate, Line
 from tactile_lab.quantity import show
-from tactile_lab.store.applied import BEFORE, ENOUGH, VISIBLE, AppliedCurrent, Shunt
+from tactile_lab.store.applied import BEFORE, ENOUGH, VISIBLE, AppliedCurrent
 from tactile_lab.store.run import Run
+from tactile_lab.store.shunt import Shunt
 
 LEVEL = 0.2
 """Levels that last so long are averaged over the shunt, s."""

@@ -8,9 +8,8 @@ scope code of a 0.1 Ohm shunt is 16 mA, so it gives no level by itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,12 +17,8 @@ from numpy.typing import ArrayLike
 from tactile_lab.analysis.estimate import Z95
 from tactile_lab.arrays import FloatArray
 from tactile_lab.scope import CLOCK_ERROR
-
-if TYPE_CHECKING:
-    from tactile_lab.store.signal import StoredSignal
-
-Shunt = Callable[[float, float], tuple[FloatArray, FloatArray]]
-"""The coil current between two times, s: its bins' middles, s, and means, A."""
+from tactile_lab.store.list_timing import list_timing
+from tactile_lab.store.shunt import BIN_TIME, Shunt
 
 SAME = 2e-5
 """Set-points nearer than this are one level, A."""
@@ -38,17 +33,12 @@ MANY = 20
 BEFORE, AFTER = 0.06, 0.004
 """An edge is looked for so long before and after the host heard of the step, s, or from
 when it was sent, if that was earlier: an answer may be lost."""
-BIN_TIME = 5e-4
-"""Bins of the shunt that edges are looked for in, s, where samples are as near."""
 BACK = 0.25
 """Part of its step below which the shunt does not fall once an edge has come."""
 TOO_NOISY = 0.45
 """Part of its step to which noise may lift or lower the shunt with an edge believed."""
 SETTLED = 5e-3
 """Time after a step until the shunt shows a level, s."""
-MOST_BINS = 1000
-"""Bins read at once: of a longer stretch only the mean is asked for."""
-
 
 BY_SAMPLES, BY_HOST = 1, 2
 """What told when a list began, of which a set-point was a point."""
@@ -95,32 +85,6 @@ class AppliedCurrent:
         return self.timing + CLOCK_ERROR * float(self.away[inside].max(initial=0.0))
 
 
-def shunt_of(signal: StoredSignal, overrange: FloatArray) -> Shunt:
-    """Reads the recorded coil current between two times.
-
-    Args:
-        signal: the coil current.
-        overrange: shape (n, 2): between which times, s, its channel left its range:
-            from these it gives nothing.
-    """
-    begins, ends = overrange.T
-
-    def seen(start: float, end: float) -> tuple[FloatArray, FloatArray]:
-        if np.any((begins < end) & (ends > start)):
-            return np.empty(0), np.empty(0)
-        part = signal.between(start, end)
-        # as fine as edges are looked for in; a long level is read from the pyramid
-        wanted = round((part.stop - part.start) * signal.interval / BIN_TIME)
-        found = signal.trace(
-            part.start, part.stop, cells=min(max(1, wanted), MOST_BINS)
-        )
-        # the last may be short; a sample is of an instant, the first of its bin's
-        middle = (found.width - signal.interval) / 2
-        return found.time[:-1] + middle, found.mean[:-1]
-
-    return seen
-
-
 def applied_current(
     time: ArrayLike,
     setpoint: ArrayLike,
@@ -160,7 +124,7 @@ def applied_current(
     dated = np.broadcast_to(np.asarray(listed), t.shape)[first]
     own_clock = dated > 0
     begin, ends = t[first].copy(), np.append(t[first][1:], t[-1])
-    edges, lead, away, timing = 0, 0.0, np.zeros(begin.size), BIN_TIME
+    edges, lead, away, timing = 0, 0.0, np.zeros(begin.size), 0.0
     sent_at = np.broadcast_to(np.asarray(asked, np.float64), t.shape)[first].copy()
     sent_at[0] = np.nan  # it stood when the run began, and was read back
     doubt = _doubt(t[first] - np.where(own_clock, np.nan, sent_at))
@@ -196,9 +160,12 @@ def applied_current(
     begin = np.maximum.accumulate(np.where(np.isfinite(seen), seen, begin))
     begin = np.maximum.accumulate(begin - doubt)
     steps = np.column_stack([begin, level])
-    by_host = bool(np.any(dated == BY_HOST))
-    edges = 0 if by_host else edges + int(np.sum(dated == BY_SAMPLES))
-    return AppliedCurrent(steps, ends, edges, lead, away, timing, doubt)
+    by_host, by_samples = bool(np.any(dated == BY_HOST)), dated == BY_SAMPLES
+    if shunt is not None and by_samples.any():
+        told = list_timing(steps, by_samples, shunt, coil_lag, visible)
+        timing = max(timing, BIN_TIME if told is None else told)
+    edges = 0 if by_host else edges + int(np.sum(by_samples))
+    return AppliedCurrent(steps, ends, edges, lead, away, timing or BIN_TIME, doubt)
 
 
 def _doubt(rounds: FloatArray) -> FloatArray:

@@ -21,9 +21,7 @@ from tactile_lab.store.applied import (
     VISIBLE,
     VISIBLE_CODES,
     AppliedCurrent,
-    Shunt,
     applied_current,
-    shunt_of,
 )
 from tactile_lab.store.data_file import check_inside, open_data
 from tactile_lab.store.folder import (
@@ -34,6 +32,7 @@ from tactile_lab.store.folder import (
     read_info,
 )
 from tactile_lab.store.layout import NEWER, RECORDS
+from tactile_lab.store.shunt import Shunt, shunt_of
 from tactile_lab.store.signal import StoredSignal, TimeAxis
 from tactile_lab.waveform import Waveform
 

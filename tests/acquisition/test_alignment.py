@@ -13,6 +13,7 @@ from tactile_lab.acquisition.alignment import (
 )
 from tactile_lab.acquisition.coil_thread import Applied, PlayedList
 from tactile_lab.current_list import CurrentList
+from tactile_lab.lag import Lag
 from tactile_lab.scope import CLOCK_ERROR
 from tactile_lab.trace import Trace
 
@@ -167,6 +168,18 @@ def test_a_list_is_found_as_a_whole_however_often_it_repeats_itself(frequency):
     assert seen.edge.sampled == pytest.approx(1.014, abs=1e-3)
     assert seen.edge.earliest == 1.0 and seen.edge.latest > 1.03
     assert seen.unlike < 0.02 and abs(seen.longer) < 1e-3
+
+
+@pytest.mark.parametrize("frequency", [20, 100])
+def test_a_list_begins_when_its_current_says_so_behind_l_over_r(frequency):
+    """As if all of the current came late by L/R it was placed 0.1 to 0.5 ms off."""
+    played, _ = played_list(frequency)
+    flow, _ = Lag(coil=1.1e-3).follow(played.points.wave.shifted(1.0137))
+    axis = np.arange(0, 4.0, 1e-3)
+    codes = np.round(flow.mean(axis, 1e-3) / 16e-3) * 16e-3
+    bins = Trace.bins(axis, codes, codes, codes, 1e-3)
+    seen = find_list(played, 100.0, bins, 1.1e-3)
+    assert seen.edge.sampled == pytest.approx(1.0137, abs=2e-5)
 
 
 def test_dwells_that_the_source_rounded_are_seen_in_its_second_half():

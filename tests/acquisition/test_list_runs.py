@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
+from sim_backend.bench import open_bench
 from sim_backend.coil.list_mode import ListFault
 from tactile_lab.acquisition.events import CoilCurrent, RunState, TrialStarted
+from tactile_lab.analysis.delay import delay
+from tactile_lab.lag import Lag
+from tactile_lab.planning.needs import needs
 from tactile_lab.store.applied import BY_SAMPLES
+from tactile_lab.waveform import Waveform
 
 LIST = (
     'protocol.levels=["200 mN", "200 mN"]',
@@ -58,12 +63,34 @@ def test_its_points_stand_where_the_samples_show_them(ran):
 
 
 @pytest.mark.parametrize(
+    ("grid", "best", "worst"), [(0.0, 0.0, 4e-5), (0.5e-3, 2e-4, 2e-3)]
+)
+def test_points_are_dated_as_well_as_the_samples_show_them(
+    run_scene, grid, best, worst
+):
+    """Half a millisecond was told of all lists: of those a source stretches, too."""
+
+    def bench(scene):
+        return open_bench(
+            scene, needs(scene), coil_faults=[ListFault(dwell_grid=grid)] * 2
+        )
+
+    with run_scene(*LIST, "protocol.ramp=20 ms", bench=bench).stored() as run:
+        timing, lag = run.applied.timing, run.scene.bench.magnet.coil_lag
+        flow, _ = Lag(coil=lag).follow(Waveform.stairs(run.applied.steps, run.duration))
+        late = []
+        for start in run.trials["start"]:
+            for ramp in (start, start + 0.52):
+                time, seen = run.shunt(ramp - 0.01, ramp + 0.04)
+                width = float(np.median(np.diff(time)))
+                late.append(delay(flow, time - width / 2, width, seen).value)
+        assert max(best, *np.abs(late)) < timing < worst
+
+
+@pytest.mark.parametrize(
     "fault", [ListFault(trigger_lost=True), ListFault(cut_after=0.1)]
 )
 def test_a_list_that_does_not_play_ends_the_run_with_the_coil_off(run_scene, fault):
-    from sim_backend.bench import open_bench
-    from tactile_lab.planning.needs import needs
-
     def bench(scene):
         return open_bench(scene, needs(scene), coil_faults=[fault])
 
