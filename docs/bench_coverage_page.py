@@ -21,6 +21,7 @@ BOUNDS = {
     ("wiring_check", "gain of a channel"),
     ("wiring_check", "V_GS"),
     ("demo", "latency"),
+    ("threshold_drift", "drift"),
 }
 """Told as bounds where they stand, which hold the truth more often."""
 
@@ -135,9 +136,10 @@ runs that told none of theirs. "CPU" is of one run with all that it tells, the m
 
 Intervals that hold the truth more often than in 97 % hold a bound rather than a
 scatter, and the bound is seldom reached: half a code of a converter whose steps no
-noise smooths (V_GS of `wiring_check`, which says that its numbers are bounds), or how
+noise smooths (V_GS of `wiring_check`, which says that its numbers are bounds), how
 well the clocks of coil and scope are aligned at the worst (the latency of a first
-spike, which the table of each report tells with it). A field's band is of those that
+spike, which the table of each report tells with it), or one step of the presses over
+all of the time (the drift of `threshold_drift`). A field's band is of those that
 came from saturation, as both fields told here do: these lie at the edge of the core's
 loop.
 
