@@ -199,10 +199,14 @@ def _touched(
     """One touch, its times taken from the force that was applied."""
     aligned = run.clock_uncertainty
     time = trial.start + np.linspace(-0.05, hold[0] + 0.1, 8000)
-    force = Waveform(time, run.force.at(time))
     level = float(run.force.at(trial.start + (hold[0] + hold[1]) / 2))
-    low, half, high = (_reached(force, time, part * level) for part in (LOW, 0.5, HIGH))
-    late = _reached(run.late(force), time, 0.5 * level) - half
+    low, half, high = (
+        _reached(run.force, time, part * level) for part in (LOW, 0.5, HIGH)
+    )
+    near = half + np.linspace(-2 * asked - 0.05, asked + 0.05, 500)
+    onset = Waveform(near, run.force.at(near))
+    late = _reached(run.late(onset), near, 0.5 * level)
+    late -= _reached(onset, near, 0.5 * level)
     spikes = within(trial.spike_times, (half - trial.start, hold[1]))
     return Touched(
         asked=asked,
