@@ -138,10 +138,13 @@ class CurrentList:
 
     @property
     def wave(self) -> Waveform:
-        """The currents one after the other, from 0 A, against s from its start."""
-        time = np.append(-self.duration, self.starts)
+        """The currents one after the other, A against s from its start.
+
+        From a second at 0 A to a second at the last, in which what lags behind settles.
+        """
+        time = np.append(-1.0, self.starts)
         steps = np.column_stack([time, np.append(0.0, self.currents)])
-        return Waveform.stairs(steps, self.duration)
+        return Waveform.stairs(steps, self.duration + 1.0)
 
     def mean(self, start: FloatArray, width: float) -> FloatArray:
         """Mean current, A, over `width` s from each `start` (s after its start)."""

@@ -20,6 +20,7 @@ from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.lag import Lag
 from tactile_lab.scope import CLOCK_ERROR
 from tactile_lab.trace import Trace
+from tactile_lab.waveform import Waveform
 
 SMALLEST = 0.03
 """Smallest step of the current that counts as an edge, A (two codes of the shunt)."""
@@ -38,6 +39,9 @@ SHIFT = 5e-4
 
 ROUNDS = 3
 """So often what is left of its delay is put right, each time to first order."""
+
+PLACES = 8
+"""Places looked at so finely, those where it seems the most alike."""
 
 CLUSTER = 20
 """Edges at either end of a segment that fix the clocks there."""
@@ -169,28 +173,34 @@ def find_list(
     inside = shunt.cut(began - reach, began + end)
     if inside.time.size < 3:
         return None
-    shift, unlike = _best(points, began, inside, shifts)
-    latest = played.latest - zero + COIL_LAG
-    placed = _placed(points, inside, began + shift, coil_lag)
-    edge = Edge(placed, played.earliest - zero, latest)
-    asked = points.mean(inside.time - began - shift, inside.width)
+    flow, _ = Lag(coil=coil_lag).follow(points.wave)
+    # one that repeats itself is nearly as alike a period off: the finest look decides
+    began, unlike = min(
+        (
+            _placed(flow, inside, began + late - coil_lag)
+            for late in _alike(points, began, inside, shifts)[:PLACES]
+        ),
+        key=lambda place: place[1],
+    )
+    edge = Edge(began, played.earliest - zero, played.latest - zero + COIL_LAG)
+    asked = flow.mean(inside.time - began, inside.width)
     seen = inside.mean.astype(np.float64)
     scale = float(np.cov(asked, seen)[0, 1] / (np.var(asked, ddof=1) or 1.0))
-    return SeenList(edge, unlike, _longer(points, began + shift, inside), scale)
+    return SeenList(edge, unlike, _longer(points, began + coil_lag, inside), scale)
 
 
-def _placed(points: CurrentList, seen: Trace, late: float, coil_lag: float) -> float:
-    """When a list began, s, which would have at `late` if its current came as set."""
-    flow, _ = Lag(coil=coil_lag).follow(points.wave)
-    bins, mean = seen.time, seen.mean.astype(np.float64)
-    began = late - coil_lag
+def _placed(flow: Waveform, seen: Trace, began: float) -> tuple[float, float]:
+    """When a list of that current began near `began`, s, and how unlike it is then."""
+    mean, place = seen.mean.astype(np.float64), began
     for _ in range(ROUNDS):
         try:
-            began += delay(flow, bins - began, seen.width, mean).value
+            place += delay(flow, seen.time - place, seen.width, mean).value
         except NotIdentifiableError:
             break
-    near = abs(began - late + coil_lag) < 2 * SHIFT
-    return began if near else late - coil_lag
+    if abs(place - began) > 2 * SHIFT:
+        place = began
+    unlike = np.var(flow.mean(seen.time - place, seen.width) - mean)
+    return place, float(unlike / (np.var(mean) or 1.0))
 
 
 def _longer(points: CurrentList, began: float, seen: Trace) -> float:
@@ -205,30 +215,35 @@ def _longer(points: CurrentList, began: float, seen: Trace) -> float:
     for part in (seen[:half], seen[half:]):
         if part.time.size < 3 or float(np.std(part.mean)) < SMALLEST:
             return 0.0
-        shift, _ = _best(points, began, part, near)
+        shift = float(_alike(points, began, part, near)[0])
         if abs(shift) > SEARCH - 2 * SHIFT:
             return 0.0  # it fits nowhere here, which says nothing of time
         found.append(shift)
     return found[1] - found[0]
 
 
-def _best(
+def _alike(
     points: CurrentList, began: float, seen: Trace, shifts: FloatArray
-) -> tuple[float, float]:
-    """The shift, s, with which the list is most like what was seen, and how unlike."""
+) -> FloatArray:
+    """Where a list is more like what was seen than just beside, the most alike first.
+
+    Args:
+        points: the list, as if its current came as it is set.
+        began: near when, s.
+        seen: the binned coil current.
+        shifts: later by these, s, evenly spaced by `SHIFT`.
+    """
     mean = seen.mean.astype(np.float64)
-    variance = float(np.var(mean)) or 1.0
     unlike = [
         np.var(points.mean(seen.time - began - by, seen.width) - mean) for by in shifts
     ]
-    left = np.array(unlike)
-    k = int(np.argmin(left))
-    off = 0.0
-    if 0 < k < shifts.size - 1:
-        before, at, after = left[k - 1 : k + 2]
-        bend = before - 2 * at + after
-        off = 0.5 * (before - after) / bend if bend > 0 else 0.0
-    return float(shifts[k] + off * SHIFT), float(left[k]) / variance
+    left = np.pad(np.array(unlike), 1, mode="edge")
+    k = np.flatnonzero((left[1:-1] <= left[:-2]) & (left[1:-1] <= left[2:]))
+    k = k[np.argsort(left[k + 1], kind="stable")]
+    before, at, after = left[k], left[k + 1], left[k + 2]
+    bend = before - 2 * at + after
+    off = np.where(bend > 0, (before - after) / np.where(bend > 0, 2 * bend, 1.0), 0.0)
+    return np.asarray(shifts[k] + off * SHIFT)
 
 
 def align(

@@ -182,6 +182,22 @@ def test_a_list_begins_when_its_current_says_so_behind_l_over_r(frequency):
     assert seen.edge.sampled == pytest.approx(1.0137, abs=2e-5)
 
 
+def test_a_long_vibration_is_not_taken_for_one_a_period_off():
+    """Of 150 Hz for 5.4 s the place a period later or sooner looked more alike."""
+    time = 2e-4 * np.arange(30_000)
+    sine = 0.3 * np.sin(2 * np.pi * 150 * time) * ((time > 0.1) & (time < 5.5))
+    current = 0.5 * np.clip(time / 0.1, 0, 1) + sine
+    current[-1] = 0.0
+    points = CurrentList(current, np.full(time.size, 2e-4))
+    flow, _ = Lag(coil=1.1e-3).follow(points.wave)
+    axis = np.arange(0, 10.0, 1e-3)
+    for began in (1.0137, 1.0181):
+        codes = np.round(flow.mean(axis - began, 1e-3) / 16e-3) * 16e-3
+        bins = Trace.bins(axis, codes, codes, codes, 1e-3)
+        seen = find_list(PlayedList(points, 101.0, 101.03), 100.0, bins, 1.1e-3)
+        assert seen.edge.sampled == pytest.approx(began, abs=2e-5)
+
+
 def test_dwells_that_the_source_rounded_are_seen_in_its_second_half():
     played, bins = played_list(20, stretch=1.015)
     seen = find_list(played, 100.0, bins)
