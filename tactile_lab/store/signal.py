@@ -57,6 +57,11 @@ class TimeAxis:
         )
         return at
 
+    def step_at(self, sample: int) -> float:
+        """Time from sample to sample in the stretch of that stored sample, s."""
+        which = int(np.searchsorted(self.first, sample, side="right")) - 1
+        return float(self.step[max(which, 0)])
+
     def sample_at(self, time: float) -> int:
         """Index of the first stored sample at or after `time`, s."""
         which = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -11,30 +12,57 @@ import numpy as np
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import RunFolderError
 from tactile_lab.signals import SIGNALS
+from tactile_lab.spikes.detection import Detection
 from tactile_lab.store.derived import DERIVED, derivation
-from tactile_lab.store.export.content import (
-    about,
-    dated_current,
-    tables,
-)
+from tactile_lab.store.export.content import ExportTable, about, tables
 from tactile_lab.store.export.library import library
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
+from tactile_lab.store.signal import StoredSignal
 from tactile_lab.whole_file import replacing
 
-UNITS = {"V": "volts", "A": "amperes", "T": "tesla", "N": "newtons", "Hz": "hertz"}
+UNITS = {
+    "V": "volts",
+    "A": "amperes",
+    "T": "tesla",
+    "K": "kelvins",
+    "N": "newtons",
+    "Hz": "hertz",
+}
 """What NWB calls SI units."""
 
 EVEN = 1e-3
 """Part of a step by which even steps may differ."""
 
+CHUNK, AT_ONCE = 1 << 16, 1 << 20
+"""Samples compressed together, and in memory at once."""
+
+READINGS = {
+    "field": "teslameter readings",
+    "temperature": "of the sensor",
+}
+"""Tables of one quantity against time."""
+
+TABLES = {
+    "spikes": "detected spikes",
+    "current": "applied current, by when the source acted; `heard`: when the computer "
+    "knew, with the force of that moment",
+    "voltages": "what source meters held, read back",
+    "events": "what happened",
+}
+"""Tables that NWB has no place of its own for."""
+
 TRIALS = {
-    "level": "force the trial is filed under, N",
     "label": "for people",
-    "hold_start": "start of the constant part, s",
-    "hold_end": "its end, s",
-    "complete": "whether it came to its end, 1 or 0",
+    "level": "force the trial is filed under",
+    "hold_start": "start of the constant part",
+    "hold_end": "its end",
+    "spikes": "detected in it",
+    "pause": "whether nothing was streamed",
+    "complete": "whether it came to its end",
+    "rest_V_C1": "V_C1 just before it",
+    "drift_V_C1": "drift of that since the first trial",
 }
 """Columns of trials beside those NWB has."""
 
@@ -61,24 +89,18 @@ def export(
         raise RunFolderError("NWB holds the samples as stored; leave out --rate.")
     selection.check(run)
     session = _session(pynwb, run, about(run, selection.names(run)))
-    _add_signals(pynwb, session, run, selection)
+    _add_signals(pynwb, session, run, selection, progress)
     _add_derived(pynwb, session, run, selection)
-    _add_readings(pynwb, session, run, selection)
-    _add_trials(session, run)
+    found = tables(run, selection)
+    _add_readings(pynwb, session, found)
+    if trials := found.get("trials"):
+        _add_trials(session, trials)
     for gap in selection.of(run.gaps):
         session.add_invalid_time_interval(
             start_time=float(gap["start"]), stop_time=float(gap["end"])
         )
     if run.detection is not None:
-        session.units = pynwb.misc.Units(
-            name="units",
-            description="detected spikes",
-            resolution=float(run.attributes["interval"]),
-        )
-        session.add_unit_column("signal", "the channel the spikes were detected on")
-        times = selection.of(run.spikes)["time"]
-        session.add_unit(spike_times=times, signal=run.detection.signal)
-    progress(0.5)
+        _add_spikes(pynwb, session, run, selection, run.detection)
     with (
         replacing(file, size(run, selection)) as part,
         pynwb.NWBHDF5IO(str(part), "w") as writer,
@@ -86,6 +108,28 @@ def export(
         writer.write(session)
     progress(1.0)
     return [file]
+
+
+def _add_spikes(
+    pynwb: Any, session: Any, run: Run, selection: Selection, detection: Detection
+) -> None:
+    """The train, and when it was listened to: where nothing was, is no silence."""
+    session.units = pynwb.misc.Units(
+        name="units",
+        description="detected spikes",
+        resolution=float(run.attributes["interval"]),
+    )
+    session.add_unit_column("signal", "the channel the spikes were detected on")
+    axis = run.axis
+    searched = [
+        [axis.time_of(first), axis.time_of(stop - 1) + axis.step_at(first)]
+        for first, stop in selection.spans(run)
+    ]
+    session.add_unit(
+        spike_times=selection.of(run.spikes)["time"],
+        signal=detection.signal,
+        **({"obs_intervals": searched} if searched else {}),
+    )
 
 
 def _session(pynwb: Any, run: Run, told: dict[str, str | float]) -> Any:
@@ -130,20 +174,23 @@ def _last_first(name: str) -> str:
     return name if "," in name or not first else f"{last}, {' '.join(first)}"
 
 
-def _add_signals(pynwb: Any, session: Any, run: Run, selection: Selection) -> None:
+def _add_signals(
+    pynwb: Any, session: Any, run: Run, selection: Selection, progress: Progress
+) -> None:
     """One series per signal and stream; where it has gaps, each sample has a time."""
     spans = selection.spans(run)
     if spans and not run.gapless:
         spans = [(spans[0][0], spans[-1][1])]
-    for name in selection.names(run):
-        if name not in run.signals:
-            continue
+    stored = [name for name in selection.names(run) if name in run.signals]
+    told = _Told(progress, len(stored) * sum(stop - first for first, stop in spans))
+    digits = len(str(len(spans)))
+    for name in stored:
         signal = run.signal(name)
-        for number, (first, stop) in enumerate(spans):
-            title = name if len(spans) == 1 else f"{name}_{number + 1}"
+        for number, (first, stop) in enumerate(spans, 1):
+            title = name if len(spans) == 1 else f"{name}_{number:0{digits}}"
             times: dict[str, Any] = {
                 "starting_time": float(run.axis.time_of(float(first))),
-                "rate": 1.0 / signal.interval,
+                "rate": 1.0 / run.axis.step_at(first),
             }
             if not run.gapless:
                 times = {"timestamps": signal.time(first, stop)}
@@ -152,7 +199,9 @@ def _add_signals(pynwb: Any, session: Any, run: Run, selection: Selection) -> No
                     name=title,
                     description=f"{signal.title}, scope input "
                     f"{signal.attributes.get('input')}",
-                    data=pynwb.H5DataIO(signal.codes[first:stop], compression="gzip"),
+                    data=pynwb.H5DataIO(
+                        _streamed(signal, first, stop, told), compression="gzip"
+                    ),
                     unit=UNITS.get(signal.unit, signal.unit),
                     conversion=signal.gain,
                     offset=signal.offset,
@@ -162,20 +211,59 @@ def _add_signals(pynwb: Any, session: Any, run: Run, selection: Selection) -> No
             )
 
 
+def _streamed(signal: StoredSignal, first: int, stop: int, told: _Told) -> Any:
+    """Codes first to stop, read as they are written: a long run fills the memory."""
+    iterator: Any = library("hdmf.data_utils", "pynwb").GenericDataChunkIterator
+    length = stop - first
+
+    class Codes(iterator):  # type: ignore[misc]
+        def _get_data(self, selection: tuple[slice, ...]) -> Any:
+            (part,) = selection
+            told(part.stop - part.start)
+            return signal.codes[first + part.start : first + part.stop]
+
+        def _get_maxshape(self) -> tuple[int, ...]:
+            return (length,)
+
+        def _get_dtype(self) -> np.dtype[Any]:
+            kind: np.dtype[Any] = signal.codes.dtype
+            return kind
+
+    return Codes(
+        buffer_shape=(min(AT_ONCE, length),), chunk_shape=(min(CHUNK, length),)
+    )
+
+
+class _Told:
+    """Tells how much of all samples is written."""
+
+    def __init__(self, progress: Progress, whole: int) -> None:
+        self._progress, self._whole, self._done = progress, whole, 0
+
+    def __call__(self, more: int) -> None:
+        self._done += more
+        self._progress(self._done / self._whole)
+
+
 def _add_derived(pynwb: Any, session: Any, run: Run, selection: Selection) -> None:
-    """The force as a stimulus, I_DS and rate in a module of their own."""
-    names, module = selection.names(run), None
-    for name in (n for n in DERIVED if n in names):
-        if name == "force":
-            time = run.force.time
-        elif name == "rate":
-            time = run.rate["time"]
-        else:
-            time = run.I_DS.time
-        end = np.inf if selection.end is None else selection.end
-        time = time[(time >= selection.start) & (time < end)]
-        if not time.size:
+    """The force as a stimulus, I_DS and rate in a module of their own.
+
+    Force and rate are told where they change, and at the ends of the part, where they
+    may be as they were long before.
+    """
+    module = None
+    start = max(selection.start, 0.0)
+    end = min(np.inf if selection.end is None else selection.end, run.duration)
+    for name in selection.names(run):
+        if name in run.signals:
             continue
+        if name == "I_DS":
+            time = run.I_DS.time
+            inside = time[(time >= start) & (time < end)]
+            time = inside if inside.size else np.array([start])
+        else:
+            time = run.force.time if name == "force" else run.rate["time"]
+            time = np.r_[start, time[(time > start) & (time < end)], end]
         series = pynwb.TimeSeries(
             name=name,
             description=f"{SIGNALS[name].title}, derived: {DERIVED[name]}",
@@ -196,47 +284,78 @@ def _add_derived(pynwb: Any, session: Any, run: Run, selection: Selection) -> No
 def _times(time: FloatArray) -> dict[str, Any]:
     """A start and a rate where times, s, are even; else each of them."""
     steps = np.diff(time)
-    if steps.size and np.ptp(steps) < EVEN * steps.mean():
+    if steps.size > 1 and np.ptp(steps) < EVEN * steps.mean():
         return {"starting_time": float(time[0]), "rate": float(1 / steps.mean())}
     return {"timestamps": time}
 
 
-def _add_readings(pynwb: Any, session: Any, run: Run, selection: Selection) -> None:
-    """Applied current as stimulus, field readings as acquisition."""
-    current, field = selection.of(dated_current(run)), selection.of(run.field)
-    if current.size:
+def _add_readings(pynwb: Any, session: Any, found: dict[str, ExportTable]) -> None:
+    """Applied current as stimulus, readings as acquisition; the tables themselves."""
+    if current := found.get("current"):
         session.add_stimulus(
             pynwb.TimeSeries(
                 name="applied_current",
                 description="set-points of the coil's current source, by when it "
                 "acted on them",
-                data=current["setpoint"],
-                timestamps=current["time"],
+                data=current.columns["setpoint"],
+                timestamps=current.columns["time"],
                 unit="amperes",
                 continuity="step",
             )
         )
-    if field.size:
-        session.add_acquisition(
-            pynwb.TimeSeries(
-                name="field",
-                description="teslameter readings",
-                data=field["field"],
-                timestamps=field["time"],
-                unit="tesla",
+    for name, what in READINGS.items():
+        if table := found.get(name):
+            session.add_acquisition(
+                pynwb.TimeSeries(
+                    name=name,
+                    description=what,
+                    data=table.columns[name],
+                    timestamps=table.columns["time"],
+                    unit=UNITS[table.units[name]],
+                )
             )
-        )
-
-
-def _add_trials(session: Any, run: Run) -> None:
-    table = tables(run, Selection()).get("trials")
-    if table is None:
+    kept = [name for name in TABLES if name in found]
+    if not kept:
         return
-    for name, meaning in TRIALS.items():
-        session.add_trial_column(name, meaning)
-    columns = {name: table.columns[name].tolist() for name in ("start", "end", *TRIALS)}
-    for row in zip(*columns.values(), strict=True):
-        found = dict(zip(columns, row, strict=True))
-        session.add_trial(
-            start_time=found.pop("start"), stop_time=found.pop("end"), **found
+    module = session.create_processing_module(
+        name="misc", description="what the run recorded beside its signals"
+    )
+    for name in kept:
+        module.add(_table(pynwb, name, found[name]))
+
+
+def _table(pynwb: Any, name: str, table: ExportTable) -> Any:
+    columns = [
+        # pynwb keeps "name" for the table's own
+        pynwb.core.VectorData(
+            name="voltage" if column == "name" else column,
+            description=described,
+            data=data,
         )
+        for column, described, data in _known(table, {})
+    ]
+    return pynwb.core.DynamicTable(name=name, description=TABLES[name], columns=columns)
+
+
+def _known(
+    table: ExportTable, meanings: dict[str, str]
+) -> Iterator[tuple[str, str, list[Any]]]:
+    """Name, meaning with unit, and values of each column that says anything."""
+    for name, values in table.columns.items():
+        if values.dtype.kind == "f" and np.isnan(values).all():
+            continue
+        if values.dtype == np.uint8:
+            values = values.astype(np.bool_)
+        meaning, unit = meanings.get(name, name), table.units[name]
+        yield name, f"{meaning}, {unit}" if unit else meaning, values.tolist()
+
+
+def _add_trials(session: Any, table: ExportTable) -> None:
+    known = {name: told for name, *told in _known(table, TRIALS)}
+    native = [known.pop(name)[1] for name in ("index", "start", "end")]
+    for name, (meaning, _) in known.items():
+        session.add_trial_column(name, meaning)
+    columns = (values for _, values in known.values())
+    for number, start, end, *row in zip(*native, *columns, strict=True):
+        found = dict(zip(known, row, strict=True))
+        session.add_trial(id=number, start_time=start, stop_time=end, **found)
