@@ -39,15 +39,14 @@ def describe(path: Path) -> dict[str, Any]:
         RunFolderError: not a run folder, or its data cannot be read.
     """
     from tactile_lab.errors import RunFolderError
-    from tactile_lab.store.folder import DATA, has_lost_data, is_live, read_info
+    from tactile_lab.store.folder import DATA, has_lost_data, read_info, told_status
     from tactile_lab.store.remarks import read_remarks
     from tactile_lab.store.run import Run
     from tactile_lab.store.stored_run import ended
     from tactile_lab.store.uncounted import uncounted
 
     info = read_info(path)
-    cut = info["status"] == "running" and not is_live(path)
-    status = "cut short" if cut else info["status"]
+    status = told_status(path, info["status"])
     summary: dict[str, Any] = {
         "run": str(path),
         "status": "data gone" if has_lost_data(path, info) else status,
@@ -80,7 +79,7 @@ def describe(path: Path) -> dict[str, Any]:
     try:
         loaded = Run.load(path) if (path / DATA).exists() else None
     except RunFolderError:
-        if not cut:
+        if status != "cut short":
             raise
         loaded = None  # killed before its first sample
     if loaded is not None:

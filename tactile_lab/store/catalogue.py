@@ -12,7 +12,7 @@ from typing import Any, Self
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.facts import Fact, facts, grouped
-from tactile_lab.store.folder import has_lost_data, is_live, read_info
+from tactile_lab.store.folder import has_lost_data, read_info, told_status
 from tactile_lab.store.index import Index
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.summary import RunSummary
@@ -90,9 +90,7 @@ class Catalogue:
     def _fitting(self, where: str) -> Iterator[RunSummary]:
         for name, told in self._index.entries(where):
             entry = RunSummary(folder=self._root / name, **told)
-            if entry.status == "running" and not is_live(entry.folder):
-                entry = replace(entry, status="cut short")
-            yield entry
+            yield replace(entry, status=told_status(entry.folder, entry.status))
 
 
 def _folders(root: Path) -> Iterator[tuple[str, list[int]]]:

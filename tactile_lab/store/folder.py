@@ -217,6 +217,11 @@ def has_lost_data(path: Path, info: Mapping[str, Any]) -> bool:
     return bool(info.get("samples")) and not (path / DATA).exists()
 
 
+def told_status(path: Path, status: str) -> str:
+    """The status in `run.json`; "cut short" where a running run has no writer."""
+    return "cut short" if status == "running" and not is_live(path) else status
+
+
 def is_live(path: Path) -> bool:
     """Whether a process still writes the run in folder `path`."""
     try:

@@ -1,6 +1,10 @@
 """Exports of a run tell all of it: force, rate, drain current, holds, settings."""
 
 import csv
+import json
+import shutil
+import zipfile
+from urllib.parse import quote, unquote
 
 import numpy as np
 import pytest
@@ -14,7 +18,9 @@ from tactile_lab.scene.load import load
 from tactile_lab.store.export import csv as to_csv
 from tactile_lab.store.export import mat as to_mat
 from tactile_lab.store.export import ro_crate
+from tactile_lab.store.export.content import about
 from tactile_lab.store.export.lines import fixed, steps, written
+from tactile_lab.store.folder import lock, read_info, write_info
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 
@@ -200,6 +206,49 @@ def test_the_folder_is_an_ro_crate(run, folder, tmp_path):
     assert rocrate.ROCrate(tmp_path / "run.zip").get("data.h5") is not None
     with pytest.raises(RunFolderError, match="whole run folder"):
         ro_crate.export(run, tmp_path / "x.zip", Selection(end=1.0))
+
+
+def test_a_crate_names_all_that_is_needed_to_repeat_the_run(tmp_path):
+    """A waveform's table may end in anything and be called anything."""
+    rocrate = pytest.importorskip("rocrate.rocrate")
+    table = tmp_path / "Kraft \u00e4#1.dat"
+    table.write_text("time_s,force_N\n0,0\n0.1,0.1\n0.2,0\n")
+    asked = (f"protocol.file={table}", 'record.signals=["force", "field"]')
+    done = Execution(load("waveform", asked), tmp_path / "runs").run()
+    folder = done.folder
+    (folder / f"{folder.name}.nwb").write_text("an export")
+    (folder / f"{folder.name}.brian2.py").write_text("another")
+    (folder / "ledger.bin").write_text("as a run that was killed has it")
+    with Run.load(folder) as run:
+        ro_crate.export(run, tmp_path / "run.zip", Selection())
+    with zipfile.ZipFile(tmp_path / "run.zip") as packed:
+        names = set(packed.namelist()) - {ro_crate.METADATA}
+        (graph,) = [json.loads(packed.read(ro_crate.METADATA))["@graph"]]
+        sizes = {name: str(packed.getinfo(name).file_size) for name in names}
+    files = {e["@id"]: e["contentSize"] for e in graph if e["@type"] == "File"}
+    assert {unquote(name): size for name, size in files.items()} == sizes
+    assert names == {
+        "data.h5", "run.json", "scene.toml", "log.jsonl", "ledger.bin",
+        f"inputs/{table.name}", "inputs/waveform.py",
+    }  # fmt: skip
+    ids = [entity["@id"] for entity in graph]
+    assert "#field%20meter" in ids and not any(" " in one for one in ids)
+    read = rocrate.ROCrate(tmp_path / "run.zip")
+    assert read.get(f"inputs/{quote(table.name)}") is not None
+
+
+def test_a_run_that_goes_on_is_no_crate_and_one_cut_short_says_so(folder, tmp_path):
+    copy = tmp_path / "run"
+    shutil.copytree(folder, copy)
+    write_info(copy, {**read_info(copy), "status": "running"})
+    with Run.load(copy) as run:
+        assert about(run)["status"] == "cut short"
+        assert "cut short" in ro_crate.crate(run)["@graph"][1]["description"]
+        with (copy / "log.jsonl").open("a") as log:
+            assert lock(log)
+            assert about(run)["status"] == "running"
+            with pytest.raises(RunFolderError, match="still recorded"):
+                ro_crate.export(run, tmp_path / "run.zip", Selection())
 
 
 @pytest.mark.parametrize("form", ["csv", "mat", "netcdf", "nwb", "parquet"])

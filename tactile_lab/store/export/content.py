@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tactile_lab.quantity import show
 from tactile_lab.signals import SIGNALS
 from tactile_lab.store.derived import DERIVED, derivable, derivation
-from tactile_lab.store.folder import SCENE
+from tactile_lab.store.folder import SCENE, told_status
 from tactile_lab.store.overrange import told as overrange_told
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
@@ -128,7 +128,7 @@ def about(run: Run, names: tuple[str, ...] = ()) -> dict[str, str | float]:
         if info.get(key):
             told[key] = str(info[key])
     told |= {
-        "status": run.status,
+        "status": told_status(run.path, run.status),
         "physics": "simulated" if run.simulated else "measured",
         "duration_s": run.duration,
     }

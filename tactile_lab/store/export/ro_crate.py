@@ -11,10 +11,12 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.quantity import looked_for
 from tactile_lab.signals import SIGNALS
+from tactile_lab.store.folder import told_status
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
@@ -36,13 +38,24 @@ FORMATS = {
     ".pdf": "application/pdf",
     ".html": "text/html",
 }
-"""Media types of what a run folder may hold."""
+"""Media types of what a run folder holds; a protocol's inputs may be anything."""
+OTHER = "application/octet-stream"
+
+EXPORTS = (
+    ".mat", ".nc", ".nwb", ".zip", ".nix", ".npy", ".npz", ".aedat4", ".brian2.py",
+    ".nest.py", ".snntorch.py",
+)  # fmt: skip
+"""Endings of what other formats leave beside the run's data."""
+EXPORT_FOLDERS = ("csv", "parquet")
 
 MEANINGS = {
     "data.h5": "samples, spikes, current, field, trials and events",
     "run.json": "what was run, when, with which instruments, and how it ended",
     "scene.toml": "the resolved scene: all that the run used; it can be run again",
     "log.jsonl": "log of the run, a line per entry",
+    "remarks.json": "name, tags, star and notes: what people say of the run",
+    "ledger.bin": "what was written of data.h5, for `tactile-lab recover`",
+    "data.killed.h5": "data.h5 as a crash left it",
     "report.html": "report: figures, numbers, settings, loss certificate",
     "results.json": "numbers of the report",
 }
@@ -76,6 +89,11 @@ def export(
             "an RO-Crate is the whole run folder; leave out --signal, --from, --until "
             "and --rate."
         )
+    if told_status(run.path, run.status) == "running":
+        raise RunFolderError(
+            f"{run.path} is still recorded; an RO-Crate names each file with its size. "
+            "Export it when the run has ended."
+        )
     beside = run.path / METADATA
     if file.suffix != ".zip" and file.resolve() != beside.resolve():
         raise RunFolderError(
@@ -105,7 +123,7 @@ def crate(run: Run) -> dict[str, Any]:
     people = [_person(notes["operator"])] if notes.get("operator") else []
     instruments = [
         {
-            "@id": f"#{name}",
+            "@id": f"#{quote(name)}",
             "@type": "IndividualProduct",
             "name": found.get("identity") or name,
             "description": ", ".join(f"{key} {text}" for key, text in found.items()),
@@ -126,7 +144,8 @@ def crate(run: Run) -> dict[str, Any]:
         "@type": "Dataset",
         "name": f"{title}: {run.name}",
         "description": f"{title} on a spiking piezoelectric tactile sensor, {kind} "
-        f"({info.get('bench')}), {run.status}; {run.duration:.4g} s, {spikes}",
+        f"({info.get('bench')}), {told_status(run.path, run.status)}; "
+        f"{run.duration:.4g} s, {spikes}",
         "datePublished": info.get("started"),
         "keywords": ["tactile sensor", "spikes", kind],
         "hasPart": [{"@id": one["@id"]} for one in files],
@@ -169,18 +188,20 @@ def _files(folder: Path) -> Iterator[Path]:
     for file in sorted(folder.rglob("*")):
         inside = file.relative_to(folder)
         hidden = any(part.startswith(".") for part in inside.parts)
-        if file.is_file() and not hidden and file.name != METADATA:
-            if file.suffix in FORMATS and inside.parts[0] != "csv":
-                yield file
+        exported = inside.parts[0] in EXPORT_FOLDERS or (
+            len(inside.parts) == 1 and file.name.endswith((METADATA, *EXPORTS))
+        )
+        if file.is_file() and not hidden and not exported:
+            yield file
 
 
 def _file(run: Run, file: Path) -> Entity:
     name = file.relative_to(run.path).as_posix()
     found: Entity = {
-        "@id": name,
+        "@id": quote(name),
         "@type": "File",
         "name": MEANINGS.get(name, file.name),
-        "encodingFormat": FORMATS[file.suffix],
+        "encodingFormat": FORMATS.get(file.suffix, OTHER),
         "contentSize": str(file.stat().st_size),
     }
     if digest := (run.info.get("files") or {}).get(name):
