@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -102,6 +103,14 @@ def _of_run(run: Path, form: str, out: Path | None, selection: Selection) -> lis
             _refuse_samples(form, selection)
             with progress(f"writing {target.name}"):
                 return write(events_of(loaded, selection), target, form)
+        if selection.rate and loaded.samples:
+            made = selection.told(loaded)["sample_rate_Hz"]
+            if not math.isclose(made, selection.rate, rel_tol=1e-3):
+                say(
+                    f"averages of whole samples: {made:.6g} S/s, not "
+                    f"{selection.rate:g} S/s",
+                    sys.stderr,
+                )
         size = module.size(loaded, selection)
         text = f"writing {target.name}, up to {bytes_text(size)}"
         if size >= LARGE:

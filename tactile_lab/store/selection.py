@@ -16,6 +16,9 @@ from tactile_lab.store.derived import derivable, derivation
 from tactile_lab.store.signal import averages
 from tactile_lab.store.stored_run import StoredRun
 
+DERIVED_STEP = 1e-3
+"""Derived signals have a value so often in a run that stores no samples, s."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Selection:
@@ -32,6 +35,13 @@ class Selection:
     start: float = 0.0
     end: float | None = None
     rate: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raises RunFolderError: a rate that is not above 0."""
+        if self.rate is not None and self.rate <= 0:
+            raise RunFolderError(
+                f"A rate of {self.rate:g} S/s holds nothing; give one above 0 S/s."
+            )
 
     def check(self, run: StoredRun) -> None:
         """Refuse what the run does not have, before a file is touched.
@@ -65,20 +75,16 @@ class Selection:
                     f"{run.path} stores no {name}, nor can it be derived; there is "
                     f"{', '.join(known) or 'no signal'}."
                 )
-        return known if self.signals is None else self.signals
+        return known if self.signals is None else tuple(dict.fromkeys(self.signals))
 
     def average(self, interval: float) -> int:
         """Samples averaged into one.
 
         Raises:
-            RunFolderError: a rate above the run's, or not above 0.
+            RunFolderError: a rate above the run's.
         """
         if self.rate is None:
             return 1
-        if self.rate <= 0:
-            raise RunFolderError(
-                f"A rate of {self.rate:g} S/s holds nothing; give one above 0 S/s."
-            )
         count = round(1.0 / (self.rate * interval))
         if count < 1:
             raise RunFolderError(
@@ -96,13 +102,52 @@ class Selection:
 
     def of(self, table: NDArray[Any]) -> NDArray[Any]:
         """Rows of a table whose time, or stretch of time, lies in the part."""
-        end = np.inf if self.end is None else self.end
         if "time" in (table.dtype.names or ()):
-            return table[(table["time"] >= self.start) & (table["time"] < end)]
+            return table[self.holds(table["time"])]
+        end = np.inf if self.end is None else self.end
         return table[(table["end"] > self.start) & (table["start"] < end)]
+
+    def holds(self, time: FloatArray) -> NDArray[np.bool_]:
+        """Which of these times, s, lie in the part."""
+        end = np.inf if self.end is None else self.end
+        found: NDArray[np.bool_] = (time >= self.start) & (time < end)
+        return found
+
+    def told(self, run: StoredRun) -> dict[str, float]:
+        """What the part is, where it is not the whole run, and its sample rate."""
+        found = {}
+        if self.start > 0 or self.end is not None:
+            end = run.duration if self.end is None else min(self.end, run.duration)
+            found = {"from_s": max(self.start, 0.0), "until_s": end}
+        if self.names(run):
+            found["sample_rate_Hz"] = round(1 / self._step(run), 6)
+        if run.samples and self.rate is not None:
+            interval = run.signal(run.signals[0]).interval
+            found["samples_averaged"] = float(self.average(interval))
+        return found
+
+    def _step(self, run: StoredRun) -> float:
+        """Time from row to row, s."""
+        if run.samples:
+            interval = run.signal(run.signals[0]).interval
+            return self.average(interval) * interval
+        return DERIVED_STEP if self.rate is None else 1 / self.rate
+
+    def _times(self, run: StoredRun) -> FloatArray:
+        """When signals are told that are derived of a run without samples, s."""
+        if run.samples or not self.names(run):
+            return np.empty(0)
+        start = max(self.start, 0.0)
+        end = run.duration if self.end is None else min(self.end, run.duration)
+        step = self._step(run)
+        # a last one that rounding alone keeps in front of the end is left out
+        count = int(np.ceil((end - start) / step - 1e-6))
+        return start + step * np.arange(count, dtype=np.float64)
 
     def rows(self, run: StoredRun) -> int:
         """How many rows `pieces` gives in all."""
+        if not run.samples:
+            return self._times(run).size
         spans = self.spans(run)
         count = self.average(run.signal(run.signals[0]).interval) if spans else 1
         return sum(-(-(last - first) // count) for first, last in spans)
@@ -115,6 +160,8 @@ class Selection:
             SceneError: a derived signal needs the run's scene, which cannot be read.
         """
         spans, names = self.spans(run), self.names(run)
+        if (time := self._times(run)).size:
+            yield time, [derivation(run, name)(time) for name in names]
         if not spans:
             return
         stored = [name for name in names if name in run.signals]

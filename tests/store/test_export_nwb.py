@@ -61,7 +61,7 @@ def recorded(bench, recorder, folder):
     recorder.temperature(0.07, 296.0)
     held = HeldVoltage(time=0.08, setpoint=1.4, voltage=1.4001, current=1e-9)
     recorder.voltage("V_GS", held)
-    recorder.event(0.09, "note", "touched the table")
+    recorder.event(0.09, "warning", "the table was touched")
     trial = Trial(
         force=Waveform.pulse(0.12, ramp=0.05, hold=0.1), label="120 mN", level=0.12
     )

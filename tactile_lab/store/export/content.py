@@ -13,6 +13,7 @@ from tactile_lab.signals import SIGNALS
 from tactile_lab.store.derived import DERIVED, derivable, derivation
 from tactile_lab.store.folder import SCENE, told_status
 from tactile_lab.store.overrange import told as overrange_told
+from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 from tactile_lab.store.stored_run import ended
@@ -34,6 +35,9 @@ UNITS = {
     "events": {"time": "s", "kind": "", "text": ""},
 }
 """Exported columns of each table and their SI units."""
+
+TABLES = (*UNITS, "trials", "remarks")
+"""All that `tables` may give."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +62,7 @@ class ExportTable:
 
 
 def tables(run: Run, selection: Selection) -> dict[str, ExportTable]:
-    """Records of the part, by name; empty ones are left out. Trials are all there.
+    """Those of `TABLES` that the part has rows of. Trials are all there.
 
     Times are s on the run's axis.
     """
@@ -72,6 +76,7 @@ def tables(run: Run, selection: Selection) -> dict[str, ExportTable]:
             units = units | {"force": "N"}
         found[name] = ExportTable(columns, units)
     found["trials"] = _trials(run)
+    found["remarks"] = _remarks(run, selection)
     return {name: table for name, table in found.items() if len(table)}
 
 
@@ -114,15 +119,29 @@ def _trials(run: Run) -> ExportTable:
     return ExportTable(columns, units)
 
 
+def _remarks(run: Run, selection: Selection) -> ExportTable:
+    """Notes that people made of the run, also afterwards; NaN: of it as a whole."""
+    notes = read_remarks(run.path).notes
+    time = np.array([np.nan if note.time is None else note.time for note in notes])
+    kept = np.isnan(time) | selection.holds(time)
+    columns = {
+        "time": time[kept],
+        "text": np.array([note.text for note in notes], dtype=str)[kept],
+        "written": np.array([note.at for note in notes], dtype=str)[kept],
+    }
+    return ExportTable(columns, {"time": "s", "text": "", "written": ""})
+
+
 def _plain(values: NDArray[Any]) -> NDArray[Any]:
     if values.dtype.kind == "S":
         return np.char.decode(values, "utf-8", errors="replace")
     return values
 
 
-def about(run: Run, names: tuple[str, ...] = ()) -> dict[str, str | float]:
-    """What the run is, by name; of the signals in `names` how they were measured."""
+def about(run: Run, selection: Selection | None = None) -> dict[str, str | float]:
+    """What the run is, by name; of a selection what it is and how it was measured."""
     info = run.info
+    names = () if selection is None else selection.names(run)
     told: dict[str, str | float] = {"run": run.name}
     for key in ("title", "protocol", "scene", "bench", "started", "reason"):
         if info.get(key):
@@ -136,8 +155,19 @@ def about(run: Run, names: tuple[str, ...] = ()) -> dict[str, str | float]:
         told["temperature_K"] = float(temperature)
     for name, found in (info.get("instruments") or {}).items():
         told[name] = str(found.get("identity") or found.get("driver") or "")
+    if info.get("seed") is not None:
+        told["seed"] = int(info["seed"])
+    if software := info.get("environment"):
+        told["software"] = ", ".join(f"{name} {it}" for name, it in software.items())
     for note, text in (info.get("notes") or {}).items():
         told[f"note {note}"] = str(text)
+    remarks = read_remarks(run.path)
+    told |= {"name": remarks.title} if remarks.title else {}
+    told |= {"tags": ", ".join(remarks.tags)} if remarks.tags else {}
+    for name, value in (info.get("detection") or {}).items():
+        told[f"detection {name}"] = value if isinstance(value, float) else str(value)
+    if selection is not None:
+        told |= selection.told(run)
     for name in names:
         if name in run.signals:
             signal = run.signal(name)

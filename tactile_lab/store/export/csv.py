@@ -9,7 +9,7 @@ import numpy as np
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.store.export.content import (
-    UNITS,
+    TABLES,
     ExportTable,
     about,
     tables,
@@ -23,13 +23,23 @@ from tactile_lab.whole_file import replacing, write_rows
 
 AT_ONCE = 1 << 15
 """Rows turned into text at once: more do not fit a processor's cache."""
-WIDTH = 12
-"""Bytes of a number with its comma, about."""
+WIDTH = 19
+"""Bytes of a number in twelve digits with its comma, at most."""
+DECIMALS = 11
+"""Bytes of point, nine decimals and comma."""
 
 
 def size(run: Run, selection: Selection) -> int:
-    """Bytes the files will take, about."""
-    return selection.rows(run) * WIDTH * (1 + len(selection.names(run)))
+    """Bytes the file of signals will take, at most."""
+    names, rows = selection.names(run), selection.rows(run)
+    widths = [len(str(int(run.duration))) + DECIMALS]
+    for name in names:
+        text = _text(run, name, selection)
+        if isinstance(text, CodeText):
+            widths.append(text.width + 1)
+        else:  # a force has a sign and one digit before its point
+            widths.append(2 + DECIMALS if name == "force" else WIDTH)
+    return rows * sum(widths)
 
 
 def export(
@@ -51,11 +61,11 @@ def export(
         made.append(_signals(run, folder / "signals.csv", selection, progress))
     for name, table in tables(run, selection).items():
         made.append(_table(folder / f"{name}.csv", table))
-    told = about(run, selection.names(run))
+    told = about(run, selection)
     keys = np.array(list(told)), np.array([str(value) for value in told.values()])
     pairs = ExportTable({"key": keys[0], "value": keys[1]}, {"key": "", "value": ""})
     made.append(_table(folder / "about.csv", pairs))
-    for name in {"signals", *UNITS, "trials"} - {file.stem for file in made}:
+    for name in {"signals", *TABLES} - {file.stem for file in made}:
         (folder / f"{name}.csv").unlink(missing_ok=True)
     return made
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ from tactile_lab.whole_file import replacing
 
 LARGEST = 2_000_000_000
 """Bytes one variable of a MAT file of version 5 can have."""
+LONGEST = 60
+"""Characters of a field's name, of 63 that there may be."""
 DOUBLE, SINGLE = 8, 4
 
 
@@ -63,8 +66,7 @@ def export(
                 file, {name: value}, oned_as="column", long_field_names=True
             )
 
-        told = about(run, names).items()
-        put("info", {re.sub(r"\W", "_", key): value for key, value in told})
+        put("info", _fields(about(run, selection)))
         # one signal after another: all of them at once would fill the memory
         for number, name in enumerate(names if rows else ()):
             alone = Selection(
@@ -88,6 +90,16 @@ def export(
         for name, table in tables(run, selection).items():
             put(name, _struct(table))
     return [file]
+
+
+def _fields(told: dict[str, Any]) -> dict[str, Any]:
+    """The same by names that MATLAB takes, each once: "a b" and "a_b" would be one."""
+    found: dict[str, Any] = {}
+    for key, value in told.items():
+        name = re.sub(r"\W", "_", key, flags=re.ASCII)[:LONGEST]
+        same = (f"{name}_{number}" for number in itertools.count(2))
+        found[next(same) if name in found else name] = value
+    return found
 
 
 def _struct(table: ExportTable) -> dict[str, Any]:

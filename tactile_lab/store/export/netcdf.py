@@ -41,14 +41,13 @@ def export(
     """
     h5netcdf = library("h5netcdf")
     selection.check(run)
-    rows, names = selection.rows(run), selection.names(run)
     with (
         replacing(file, size(run, selection)) as part,
         h5netcdf.File(part, "w") as out,
     ):
         out.attrs["Conventions"] = "CF-1.11"
-        out.attrs.update(about(run, names))
-        if rows:
+        out.attrs.update(about(run, selection))
+        if selection.rows(run):
             _signals(out, run, selection, progress)
         for name, table in tables(run, selection).items():
             group = out.create_group(name)

@@ -50,6 +50,7 @@ TABLES = {
     "knew, with the force of that moment",
     "voltages": "what source meters held, read back",
     "events": "what happened",
+    "remarks": "what people noted, also afterwards",
 }
 """Tables that NWB has no place of its own for."""
 
@@ -88,7 +89,7 @@ def export(
     if selection.rate is not None:
         raise RunFolderError("NWB holds the samples as stored; leave out --rate.")
     selection.check(run)
-    session = _session(pynwb, run, about(run, selection.names(run)))
+    session = _session(pynwb, run, about(run, selection))
     _add_signals(pynwb, session, run, selection, progress)
     _add_derived(pynwb, session, run, selection)
     found = tables(run, selection)

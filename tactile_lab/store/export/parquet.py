@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tactile_lab.store.export.content import (
-    UNITS,
+    TABLES,
     about,
     compressed_size,
     tables,
@@ -44,7 +44,7 @@ def export(
     parquet = library("pyarrow.parquet", "pyarrow")
     selection.check(run)
     rows, names = selection.rows(run), selection.names(run)
-    told = {key: str(value) for key, value in about(run, names).items()}
+    told = {key: str(value) for key, value in about(run, selection).items()}
 
     def schema(columns: dict[str, Any], units: dict[str, str]) -> Any:
         fields = [
@@ -77,6 +77,6 @@ def export(
         with replacing(made[-1], 0) as part:
             whole = pa.table(list(arrays.values()), schema=shape)
             parquet.write_table(whole, part)
-    for name in {"signals", *UNITS, "trials"} - {file.stem for file in made}:
+    for name in {"signals", *TABLES} - {file.stem for file in made}:
         (folder / f"{name}.parquet").unlink(missing_ok=True)
     return made
