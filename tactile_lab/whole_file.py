@@ -91,8 +91,8 @@ def replacing(path: Path, size: int = 0, *, lasting: bool = False) -> Iterator[P
             f"{path} is a device or a pipe; a file in its place would end it. "
             "Give another name."
         )
+    check_space(next(one for one in path.absolute().parents if one.exists()), size)
     path.parent.mkdir(parents=True, exist_ok=True)
-    check_space(path.parent, size)
     # another program, or another part of this one, may write the same file
     name, number = f".{path.stem[:LONGEST]}", next(_NUMBERS)
     part = path.with_name(f"{name}.{os.getpid()}.{number}.part{path.suffix}")

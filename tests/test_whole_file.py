@@ -49,6 +49,15 @@ WRITERS: list[Callable[[Path], object]] = [
 ]
 
 
+def test_no_folder_is_made_for_what_has_no_room(tmp_path: Path) -> None:
+    with (
+        pytest.raises(RecordingError, match=f"disk of {tmp_path} has"),
+        replacing(tmp_path / "csv" / "signals.csv", 1 << 60),
+    ):
+        raise AssertionError("there was room")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("write", WRITERS)
 def test_a_full_disk_leaves_what_was_there(tmp_path: Path, write) -> None:
     path = tmp_path / "pulses" / "a.toml"

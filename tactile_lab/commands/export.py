@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -76,7 +77,8 @@ def command(
         except OSError as error:
             if error.errno is None:
                 raise  # HDF5 could not read
-            said = f"{out or run} cannot be written: {error.strerror}."
+            # HDF5 puts addresses and more into the error's own text
+            said = f"{out or run} cannot be written: {os.strerror(error.errno)}."
             fail(f"{said} Name another place with --out.", 2)
             return
     from tactile_lab.quantity import bytes_text

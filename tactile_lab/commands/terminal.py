@@ -7,11 +7,14 @@ piped stay plain.
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 import click
@@ -169,10 +172,41 @@ def working(text: str) -> Iterator[None]:
 def progress(text: str) -> Iterator[Callable[[float], None]]:
     """How far a piece of work is: give what it yields the part done, 0 to 1.
 
-    On a terminal a bar with the time left; where piped, lines once it takes long.
+    On a terminal a bar with the time left; where piped, lines once it takes long. A
+    Ctrl-C that was swallowed, in a callback from C, ends the work at its next update.
     """
-    with ProgressLine(1.0, text, patience=PATIENCE) as line:
-        yield line.update
+    with (
+        _noting_interrupts() as heard,
+        ProgressLine(1.0, text, patience=PATIENCE) as line,
+    ):
+
+        def update(done: float) -> None:
+            if heard:
+                raise KeyboardInterrupt
+            line.update(done)
+
+        yield update
+
+
+@contextmanager
+def _noting_interrupts() -> Iterator[list[int]]:
+    """The Ctrl-Cs that came since; each is raised as Python does."""
+    heard: list[int] = []
+
+    def note(number: int, _: FrameType | None) -> NoReturn:
+        heard.append(number)
+        raise KeyboardInterrupt
+
+    # another thread sets no handler, and one that is not Python's minds them itself
+    ours = threading.current_thread() is threading.main_thread()
+    if ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, note)
+        try:
+            yield heard
+        finally:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+    else:
+        yield heard
 
 
 class StatusLine:

@@ -2,11 +2,19 @@
 
 import io
 import re
+import signal
+from contextlib import suppress
 
 import click
 import pytest
 
-from tactile_lab.commands.terminal import ProgressLine, print_json, refusing, say
+from tactile_lab.commands.terminal import (
+    ProgressLine,
+    print_json,
+    progress,
+    refusing,
+    say,
+)
 from tactile_lab.errors import SceneError
 
 
@@ -129,3 +137,15 @@ def test_colour_is_for_terminals_and_not_where_it_is_unwanted(monkeypatch):
     assert "\x1b[1;31mWRONG" in terminal.getvalue()
     assert pipe.getvalue() == "V_C1: WRONG\n"
     assert "31m" not in unwanted.getvalue()
+
+
+def test_a_ctrl_c_that_was_swallowed_ends_the_work_at_its_next_update():
+    reached = []
+    with pytest.raises(KeyboardInterrupt), progress("writing") as update:
+        with suppress(KeyboardInterrupt):  # as in a callback from C
+            signal.raise_signal(signal.SIGINT)
+        reached.append("went on")
+        update(0.5)
+        reached.append("beyond the update")
+    assert reached == ["went on"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scipy.io
 from click.testing import CliRunner
+from full_disk import full_after
 
 from tactile_lab.cli import cli
 from tactile_lab.engine.execution import Execution
@@ -340,6 +341,18 @@ def test_a_run_that_goes_on_is_no_crate_and_one_cut_short_says_so(folder, tmp_pa
             assert about(run)["status"] == "running"
             with pytest.raises(RunFolderError, match="still recorded"):
                 ro_crate.export(run, tmp_path / "run.zip", Selection())
+
+
+@pytest.mark.parametrize("form", ["csv", "mat", "parquet"])
+def test_a_full_disk_is_told_in_plain_words(folder, tmp_path, form):
+    """Not of HDF5, which does not outlive a file that cannot be written to its end."""
+    out = tmp_path / "made"
+    asked = ["export", str(folder), "--to", form, "--out", str(out)]
+    with full_after(50_000):
+        done = CliRunner().invoke(cli, asked)
+    assert done.exit_code == 2
+    assert f"{out} cannot be written: File too large. Name another" in done.output
+    assert not [file for file in tmp_path.rglob("*") if file.is_file()]
 
 
 @pytest.mark.parametrize("form", ["csv", "mat", "netcdf", "nwb", "parquet"])

@@ -55,7 +55,6 @@ def export(
         OSError: the folder cannot be written.
     """
     selection.check(run)
-    folder.mkdir(parents=True, exist_ok=True)
     made = []
     if selection.rows(run):
         made.append(_signals(run, folder / "signals.csv", selection, progress))
