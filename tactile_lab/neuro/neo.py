@@ -23,11 +23,12 @@ def block(events: Events) -> Any:
     made.annotate(physics=str(about.get("physics", "simulated")))
     segment = neo.Segment(name=made.name, index=0)
     made.segments.append(segment)
+    start, stop = about.get("part_s", (0.0, events.duration))
     for taxel, times in enumerate(events.trains()):
         x, y = events.places[taxel].tolist()
         segment.spiketrains.append(
             neo.SpikeTrain(
-                times, units="s", t_start=0.0, t_stop=events.duration,
+                times, units="s", t_start=start, t_stop=stop,
                 name=f"taxel {taxel}", taxel=taxel, x_m=x, y_m=y,
             )
         )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 from tactile_lab.errors import RunFolderError
 from tactile_lab.skin.events import Events
 from tactile_lab.store.derived import derivable
-from tactile_lab.store.export.content import about, tables
+from tactile_lab.store.export.content import about, changes, tables
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 
@@ -19,7 +19,7 @@ def events_of(run: Run, selection: Selection | None = None) -> Events:
 
     Args:
         run: its times stay those of the run's axis.
-        selection: only the spikes of this part.
+        selection: only the spikes and the force of this part.
 
     Raises:
         RunFolderError: no spikes were detected in it.
@@ -35,6 +35,7 @@ def events_of(run: Run, selection: Selection | None = None) -> Events:
     told: dict[str, Any] = {
         key: value for key, value in about(run).items() if key != "scene.toml"
     }
+    told["part_s"] = selection.ends(run)
     told |= {"name": run.name, "signal": run.detection.signal}
     told.setdefault("title", str(told["name"]))
     told["trials"] = []
@@ -43,9 +44,9 @@ def events_of(run: Run, selection: Selection | None = None) -> Events:
         told["trials"] = list(zip(*columns, strict=True))
     most = np.nan
     if "force" in derivable(run):
-        force = run.force
-        told["force"] = force.time, force.value
-        most = float(np.max(force.value))
+        time_of_force = changes(run, "force", selection)
+        told["force"] = time_of_force, run.force.at(time_of_force)
+        most = float(np.max(told["force"][1]))
     return Events(
         time=time,
         taxel=np.zeros(time.size, np.int32),

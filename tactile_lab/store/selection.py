@@ -113,12 +113,17 @@ class Selection:
         found: NDArray[np.bool_] = (time >= self.start) & (time < end)
         return found
 
+    def ends(self, run: StoredRun) -> tuple[float, float]:
+        """Where the part begins and ends within the run, s."""
+        end = run.duration if self.end is None else min(self.end, run.duration)
+        return max(self.start, 0.0), end
+
     def told(self, run: StoredRun) -> dict[str, float]:
         """What the part is, where it is not the whole run, and its sample rate."""
         found = {}
         if self.start > 0 or self.end is not None:
-            end = run.duration if self.end is None else min(self.end, run.duration)
-            found = {"from_s": max(self.start, 0.0), "until_s": end}
+            start, end = self.ends(run)
+            found = {"from_s": start, "until_s": end}
         if self.names(run):
             found["sample_rate_Hz"] = round(1 / self._step(run), 6)
         if run.samples and self.rate is not None:
@@ -137,9 +142,7 @@ class Selection:
         """When signals are told that are derived of a run without samples, s."""
         if run.samples or not self.names(run):
             return np.empty(0)
-        start = max(self.start, 0.0)
-        end = run.duration if self.end is None else min(self.end, run.duration)
-        step = self._step(run)
+        (start, end), step = self.ends(run), self._step(run)
         # a last one that rounding alone keeps in front of the end is left out
         count = int(np.ceil((end - start) / step - 1e-6))
         return start + step * np.arange(count, dtype=np.float64)

@@ -135,6 +135,21 @@ def test_a_part_of_a_run_has_the_spikes_of_that_part(run):
     assert np.array_equal(part.time, whole.time[whole.time < middle])
 
 
+def test_neo_of_a_part_ends_where_the_part_does(run):
+    """Else a silence is told of where nothing was looked for."""
+    pytest.importorskip("neo")
+    part = events_of(run, Selection(start=0.3, end=0.9))
+    (segment,) = to_neo.block(part).segments
+    (train,), (force,) = segment.spiketrains, segment.irregularlysampledsignals
+    assert (float(train.t_start), float(train.t_stop)) == (0.3, 0.9)
+    assert 0 < len(train) < len(events_of(run).time)
+    assert (float(force.times[0]), float(force.times[-1])) == (0.3, 0.9)
+    assert force.magnitude[-1, 0] == pytest.approx(
+        float(run.force.at(np.array([0.9]))[0])
+    )
+    assert 1e3 * part.largest_force[0] == pytest.approx(1e3 * float(force.max()))
+
+
 def test_runs_and_skins_are_exported_from_the_command_line(
     run_folder, skin_folder, tmp_path
 ):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.quantity import show
 from tactile_lab.signals import SIGNALS
 from tactile_lab.store.derived import DERIVED, derivable, derivation
@@ -78,6 +79,18 @@ def tables(run: Run, selection: Selection) -> dict[str, ExportTable]:
     found["trials"] = _trials(run)
     found["remarks"] = _remarks(run, selection)
     return {name: table for name, table in found.items() if len(table)}
+
+
+def changes(run: Run, name: str, selection: Selection) -> FloatArray:
+    """When the derived force or rate changes in the part, s, and the part's ends.
+
+    Between two of them it is a line, or what it was at the first; before the first it
+    may have been so for long.
+    """
+    time = run.force.time if name == "force" else run.rate["time"]
+    start, end = selection.ends(run)
+    found: FloatArray = np.r_[start, time[(time > start) & (time < end)], end]
+    return found
 
 
 def dated_current(run: Run) -> NDArray[Any]:

@@ -14,7 +14,12 @@ from tactile_lab.errors import RunFolderError
 from tactile_lab.signals import SIGNALS
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.store.derived import DERIVED, derivation
-from tactile_lab.store.export.content import ExportTable, about, tables
+from tactile_lab.store.export.content import (
+    ExportTable,
+    about,
+    changes,
+    tables,
+)
 from tactile_lab.store.export.library import library
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
@@ -247,24 +252,17 @@ class _Told:
 
 
 def _add_derived(pynwb: Any, session: Any, run: Run, selection: Selection) -> None:
-    """The force as a stimulus, I_DS and rate in a module of their own.
-
-    Force and rate are told where they change, and at the ends of the part, where they
-    may be as they were long before.
-    """
+    """The force as a stimulus, I_DS and rate in a module of their own."""
     module = None
-    start = max(selection.start, 0.0)
-    end = min(np.inf if selection.end is None else selection.end, run.duration)
     for name in selection.names(run):
         if name in run.signals:
             continue
         if name == "I_DS":
             time = run.I_DS.time
-            inside = time[(time >= start) & (time < end)]
-            time = inside if inside.size else np.array([start])
+            inside = time[selection.holds(time)]
+            time = inside if inside.size else np.array([selection.ends(run)[0]])
         else:
-            time = run.force.time if name == "force" else run.rate["time"]
-            time = np.r_[start, time[(time > start) & (time < end)], end]
+            time = changes(run, name, selection)
         series = pynwb.TimeSeries(
             name=name,
             description=f"{SIGNALS[name].title}, derived: {DERIVED[name]}",
