@@ -174,6 +174,15 @@ CASES = {
         told.identification,
         clock=CLOCK_ERROR / Z95,
     ),
+    "identify, rate_force with the shunt": Case(
+        "rate_force",
+        (
+            'record.signals=["coil_current","V_C1","V_K","spikes"]',
+            'protocol.levels=["100 mN","140 mN","190 mN","120 mN"]',
+        ),
+        told.identification,
+        clock=CLOCK_ERROR / Z95,
+    ),
 }
 
 

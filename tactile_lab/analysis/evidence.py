@@ -44,6 +44,8 @@ LEAST = 1e-9
 """Smallest scatter of any evidence, V."""
 OFFSET = "V_C1's offset"
 """The cause by which all of V_C1 is off alike."""
+STEPS = ("V_C1's steps", "V_C1's steps, a quarter of a code on")
+"""Causes by which it is off by where it lies between two codes of its converter."""
 Moved = Callable[[Circuit, Mapping[str, float]], DrivenCircuit]
 LONGEST = 1.0
 """Intervals longer than this tell little about rate and much about drift, s."""
@@ -76,6 +78,29 @@ class Residuals:
         self.bins = 0 if V_C1 is None else int(V_C1.time.size)
         self.offset = 0.0 if V_C1 is None else math.hypot(V_C1.resolution, V_C1.offset)
         self.size = self.bins + self._earlier.size
+
+    @property
+    def channel(self) -> tuple[str, ...]:
+        """Causes by which V_C1's channel puts it off."""
+        digitised = self._trace is not None and self._trace.resolution > 0
+        offset = (OFFSET,) if self.bins and self.offset else ()
+        return (*offset, *(STEPS if digitised else ()))
+
+    def less_channel(
+        self, misses: FloatArray, parts: Mapping[str, float]
+    ) -> FloatArray:
+        """Residuals less what parts of the bands of `channel` put V_C1 off by, V.
+
+        Args:
+            misses: what `under` gave, shape (size,).
+            parts: by cause.
+        """
+        left, trace = misses.copy(), self._trace
+        if trace is not None:
+            off = trace.staircase(trace.value - misses[: self.bins])
+            stairs = off @ [parts.get(cause, 0.0) for cause in STEPS]
+            left[: self.bins] -= parts.get(OFFSET, 0.0) * self.offset + stairs
+        return left
 
     @property
     def times(self) -> FloatArray:
@@ -167,7 +192,7 @@ class JointResiduals:
 
     Attributes:
         names: what is fitted.
-        causes: what else is open, within bands; the offset of V_C1 among them.
+        causes: what else is open, within bands; what V_C1's channel does among them.
         size: so many data.
     """
 
@@ -177,14 +202,12 @@ class JointResiduals:
         self._scaled = scaled
         factors = (factor_of(i) for i in range(1, len(runs) + 1))
         self.names = (*self._shared, *(factors if scaled else ()))
-        causes = dict.fromkeys(cause for run in runs for cause in run.causes)
-        shifted = any(run.bins and run.offset for run in runs)
-        self.causes = (*causes, *((OFFSET,) if shifted else ()))
+        of_bench = (cause for run in runs for cause in run.causes)
+        of_channel = (cause for run in runs for cause in run.channel)
+        self.causes = tuple(dict.fromkeys((*of_bench, *of_channel)))
         self.size = sum(run.size for run in runs)
         bins = [np.arange(run.size) < run.bins for run in runs]
-        offsets = [of * run.offset for of, run in zip(bins, runs, strict=True)]
         self.traced = np.concatenate(bins)
-        self._offsets = np.concatenate(offsets)
 
     def driven(self, x: FloatArray) -> list[DrivenCircuit]:
         """Circuit and force of each run."""
@@ -214,11 +237,10 @@ class JointResiduals:
         one with the other. Shape (size + causes,).
         """
         parts = x[len(self.names) :]
+        moved = dict(zip(self.causes, parts, strict=True))
         pairs = zip(self._runs, self.driven(x), strict=True)
-        data = np.concatenate([run.under(one) for run, one in pairs])
-        if OFFSET in self.causes:
-            data -= parts[-1] * self._offsets
-        return np.concatenate([data, Z95 * parts])
+        data = [run.less_channel(run.under(one), moved) for run, one in pairs]
+        return np.concatenate([*data, Z95 * parts])
 
     @property
     def first(self) -> FloatArray:

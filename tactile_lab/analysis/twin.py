@@ -68,6 +68,21 @@ class Measured:
         parts = self._parts
         return taken.value @ (np.tile(WEIGHTS, parts) / parts)
 
+    def staircase(self, voltage: FloatArray) -> FloatArray:
+        """What the converter's steps may put bins of that mean off by, V; (n, 2).
+
+        The first term of the staircase's Fourier series, a sine of the voltage with one
+        code for its period: its sine and its cosine, as large as without any noise. In
+        a bin that passes over codes less of it is left.
+        """
+        if self.resolution == 0 or voltage.size < 2:
+            return np.zeros((voltage.size, 2))
+        codes = voltage / self.resolution
+        passed = np.gradient(codes, self.time) * self.width
+        left = self.resolution / math.pi * np.sinc(passed)
+        phase = 2 * np.pi * codes
+        return np.column_stack([left * np.sin(phase), left * np.cos(phase)])
+
     @property
     def _parts(self) -> int:
         return min(max(math.ceil(self.width / LONGEST), 1), MOST)

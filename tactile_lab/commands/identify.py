@@ -91,8 +91,9 @@ def _print(found: FittedRuns) -> None:
     if together.scatter_V_C1 is not None:
         say(
             f"V_C1 is left with {together.scatter_V_C1 * 1e3:.2g} mV of scatter. The "
-            "intervals hold noise, one code of offset of its channel, the clocks, and "
-            "what the bench states of followers, lag, force and temperature"
+            "intervals hold noise, one code of offset of its channel, its converter's "
+            "steps, the clocks, and what the bench states of followers, lag, force and "
+            "temperature"
             + (", each the same in all runs." if many else ".")
             + " What is not fitted counts as exact."
         )

@@ -124,6 +124,23 @@ def test_an_offset_of_the_channel_hides_nothing_that_the_shape_of_V_C1_tells(off
     assert not fitted.warnings, "alike errors that are small are no trouble"
 
 
+@pytest.mark.parametrize("edge", [0.0, 0.25, 0.5, 0.75])
+def test_what_a_converters_steps_leave_of_a_mean_is_not_taken_for_the_sensor(edge):
+    """Noise of a third of a code leaves means off by 0.7 mV, alike at one voltage."""
+    force = Waveform.pulse(0.14, ramp=0.25, hold=1.0, rest=8.0)
+    truth, code, bins, samples = Circuit(V_GS=1.403), 16e-3, 800, 2000
+    made = simulate(truth, force, keep=("V_C1",))
+    time = (np.arange(bins) + 0.5) * force.end / bins
+    rng = np.random.default_rng(7)
+    seen = made.sample("V_C1", time)[:, np.newaxis] / code + edge
+    seen = np.rint(seen + rng.normal(0, 0.32, (bins, samples))) - edge
+    trace = Measured("V_C1", time, code * seen.mean(axis=1), resolution=code)
+    found = identify(Circuit(), ("V_GS", "tau"), force, force.end, V_C1=trace)
+    for name, value in {"V_GS": truth.V_GS, "tau": truth.tau}.items():
+        assert found.estimates[name].low < value < found.estimates[name].high
+    assert found.scatter_V_C1 < 0.02 * code, "what noise of the bins alone makes"
+
+
 def test_codes_that_no_noise_smooths_are_no_independent_readings():
     truth, hits = {"V_GS": 1.402, "tau": 8.5}, []
     step = 39e-3
