@@ -144,8 +144,9 @@ _SHOWN = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M",
 def show(value: float, unit: str, digits: int = 4) -> str:
     """`value` (SI) for a person: "50 mN", with a prefix that keeps 1 to 999 in front.
 
-    Areas are in m^2 or mm^2; other powers and compound units get no prefix. A true
-    minus is used. Below 1e-18 it is a rounding error, and 0 for a person.
+    Areas are in m^2 or mm^2; other powers, compound units and numbers without a unit
+    get no prefix. A true minus is used. Below 1e-18 it is a rounding error, and 0 for a
+    person.
     """
     if not math.isfinite(value):
         return f"{value} {unit}"
@@ -154,14 +155,14 @@ def show(value: float, unit: str, digits: int = 4) -> str:
     prefix, number = "", value
     if unit in ("m^2", "m²") and 0 < abs(value) < 0.01:
         prefix, number = "m", value * 1e6
-    elif value != 0 and not any(c in unit for c in " ^²"):
+    elif value != 0 and unit and not any(c in unit for c in " ^²"):
         power = _power(value)
         number = value / 10.0**power
         if float(f"{abs(number):.{digits}g}") >= 1000 and power < 9:
             power, number = power + 3, number / 1000
         prefix = _SHOWN[power]
     text = f"{number:.{digits}g}"
-    if "e+" in text and abs(number) < 1e4:
+    if "e+" in text and abs(number) < (1e4 if unit else 1e9):
         text = f"{float(text):.0f}"
     return printed(f"{text} {prefix}{unit}").rstrip()
 

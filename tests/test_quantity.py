@@ -111,6 +111,9 @@ def test_what_is_shown_is_right_to_its_digits(value):
         (-8.3e-20, "T", "0 T"),
         (1.41e-15, "A", "1.41 fA"),
         (float("inf"), "s", "inf s"),
+        (0.102, "", "0.102"),
+        (-5.85e-5, "", "−5.85e−05"),
+        (52000, "", "52000"),
     ],
 )
 def test_shown_for_people(value, unit, shown):

@@ -39,11 +39,16 @@ def conclude(found: Gathered) -> Conclusion:
         known = column[np.isfinite(column)]
         if known.size and design.sampled:
             low, high = np.quantile(known, (0.025, 0.975))
+            of, whom = "", "the points"
+            if known.size < column.size:
+                of = f"of the {known.size} of {column.size} that have one, "
+                whom = "them"
             sentences.append(
-                f"{name}: median {_told(found, name, np.median(known))}, 95 % of the "
-                f"points from {_told(found, name, low)} to {_told(found, name, high)}."
+                f"{name}: {of}median {_told(found, name, np.median(known))}, 95 % of "
+                f"{whom} from {_told(found, name, low)} to {_told(found, name, high)}."
             )
             values[name] = {
+                "points": int(known.size),
                 "median": float(np.median(known)),
                 "low": float(low),
                 "high": float(high),
@@ -60,6 +65,8 @@ def conclude(found: Gathered) -> Conclusion:
 
 
 def _told(found: Gathered, name: str, value: float, *, signed: bool = False) -> str:
+    if not math.isfinite(value):
+        return "none"
     text = show(float(value), found.unit(name))
     return f"+{text}" if signed and value > 0 else text
 
@@ -132,7 +139,8 @@ def _yield(
         ]
     if shares is not None and len(shares) == 1:
         (share,) = shares
-        sentences.append(f"{said}: {_share(share)}, Wilson's 95 % interval).")
+        taken = "" if design.method == "random" else ", as of independent draws"
+        sentences.append(f"{said}: {_share(share)}, Wilson's 95 % interval{taken}).")
         values["yield"] = share
         return
     values["yield"] = float(good.mean())
@@ -247,7 +255,7 @@ def _tornado(found: Gathered) -> Iterator[Table]:
             half = axis.spread.width if axis.spread is not None else 0.0
             rows.append(
                 (
-                    abs(high - low),
+                    float(np.nan_to_num(abs(high - low), nan=-1.0)),  # not known: last
                     (
                         axis.key,
                         f"±{show(half, axis.unit)}",

@@ -98,6 +98,36 @@ def test_the_yield_counts_what_is_good_with_an_interval(tmp_path: Path) -> None:
     )
 
 
+def test_what_not_every_point_has_is_told_of_those_that_have_it(tmp_path: Path) -> None:
+    given = tomllib.loads(STUDY) | {"keep": ["spike_count", "first_spike"]}
+    given |= {"set": {"protocol.levels": ["96.5 mN"]}, "draw": {"points": 20}}
+    found = carry_out(load_study(given), tmp_path, count=1)
+    fired = found.numbers()["spike_count"] > 0
+    (of,) = (s for s in conclude(found).sentences if s.startswith("first_spike"))
+    assert 0 < fired.sum() < 20
+    assert f"of the {fired.sum()} of 20 that have one, median" in of
+    assert conclude(found).values["first_spike"]["points"] == fired.sum()
+
+
+def test_a_tornado_says_none_where_a_point_has_no_number(tmp_path: Path) -> None:
+    given = tomllib.loads(STUDY) | {"keep": ["first_spike"]}
+    given |= {"set": {"protocol.levels": ["96 mN"]}, "draw": {"method": "tornado"}}
+    (table,) = conclude(carry_out(load_study(given), tmp_path, count=1)).tables
+    assert "nan" not in f"{table.title} {table.rows}"
+
+
+@pytest.mark.parametrize(
+    ("method", "told"), [("random", False), ("latin hypercube", True), ("sobol", True)]
+)
+def test_a_share_of_draws_that_are_not_independent_says_so(
+    tmp_path: Path, method: str, told: bool
+) -> None:
+    given = tomllib.loads(STUDY) | {"draw": {"points": 32, "method": method}}
+    given |= {"require": {"critical_force": {"most": "92.6 mN"}}}
+    found = conclude(carry_out(load_study(given), tmp_path, count=1))
+    assert ("as of independent draws" in found.text) is told
+
+
 @pytest.mark.parametrize("most", [0.0926, "92.6 mN"])
 def test_draws_at_several_values_have_a_yield_at_each_and_none_together(
     tmp_path: Path, most: float | str
