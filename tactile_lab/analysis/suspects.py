@@ -23,8 +23,8 @@ from tactile_lab.analysis.spike_pairs import irregularity
 from tactile_lab.analysis.twin import Measured
 from tactile_lab.arrays import FloatArray
 from tactile_lab.deviation import Deviation, DrivenCircuit
-from tactile_lab.errors import TactileLabError
-from tactile_lab.quantity import rounded, show
+from tactile_lab.errors import NotIdentifiableError, TactileLabError
+from tactile_lab.quantity import printed, rounded, show
 
 SUSPECTS: Mapping[str, float] = {
     "input_bias": 30e-12,
@@ -90,19 +90,19 @@ class Suspect:
 
     @property
     def text(self) -> str:
-        """What differs, by how much: "V_GS +4 mV (3.6 mV to 4.4 mV, 95 %)".
+        """What differs, by how much: "V_GS +4 mV (3.6 to 4.4 mV, 95 %)".
 
         Without the interval where it explains nothing: that is of the noise alone.
         """
-        title, unit = TITLES[self.name]
-        values = (self.size.value, self.size.low, self.size.high)
-        if unit == "%":
-            value, low, high = (f"{100 * v:.3g} %".replace("-", "−") for v in values)
+        (title, unit), size = TITLES[self.name], self.size
+        if self.misfit <= EXPLAINED:
+            told = size.text(unit, 100.0) if unit == "%" else size.shown(unit)
+        elif unit == "%":
+            told = printed(f"{100 * size.value:.3g} %")
         else:
-            value, low, high = (show(v, unit, 3) for v in values)
-        sign = "+" if self.size.value > 0 else ""
-        known = "" if self.misfit > EXPLAINED else f" ({low} to {high}, 95 %)"
-        return f"{title} {sign}{value}{known} from what is believed"
+            told = show(size.value, unit, 3)
+        sign = "+" if size.value > 0 else ""
+        return f"{title} {sign}{told} from what is believed"
 
 
 @dataclass(frozen=True)
@@ -358,10 +358,13 @@ class _Trial:
     def _told(self, slope: FloatArray, but: str) -> float:
         """What the data tell of a size, 1/step^2, each band's cause left free in it."""
         free, _ = self._free(but)
-        shared = free.T @ slope
-        prior = 1.96**2 * np.eye(free.shape[1])
-        told = slope @ slope - shared @ np.linalg.solve(free.T @ free + prior, shared)
-        return max(float(told), 1e-300)
+        held = np.vstack([free, 1.96 * np.eye(free.shape[1])])
+        seen = np.concatenate([slope, np.zeros(free.shape[1])])
+        left = seen - held @ np.linalg.lstsq(held, seen, rcond=None)[0]
+        told = float(left @ left)
+        if told == 0:
+            raise NotIdentifiableError("no data depend on it")
+        return told
 
     def fitted(self, name: str) -> Suspect | None:
         """The suspect of its best size; None where the model cannot follow it."""
@@ -392,7 +395,10 @@ class _Trial:
             moved = replace(self._belief, deviation=off).moved(self._parts)
             return self._under(moved)
 
-        x, left = _least(lambda x: self.freed(residual(x), own))
+        # no lag is less than none
+        lag = self._belief.magnet.eddy_lag
+        lowest = -(lag + at) / step if name == "lag" else -math.inf
+        x, left = _least(lambda x: self.freed(residual(x), own), lowest)
         slope = (residual(x + DIFFERENCE) - residual(x)) / DIFFERENCE
         misfit = self.misfit(left)
         error = step * max(misfit, 1.0) / math.sqrt(self._told(slope, own))
@@ -400,8 +406,10 @@ class _Trial:
         return Suspect(name, size, misfit), left
 
 
-def _least(residual: Callable[[float], FloatArray]) -> tuple[float, FloatArray]:
-    """Where a residual is least, and what it is there.
+def _least(
+    residual: Callable[[float], FloatArray], lowest: float
+) -> tuple[float, FloatArray]:
+    """Where a residual is least, not below `lowest`, and what it is there.
 
     By Gauss and Newton from 0, at most `LONGEST` at once, halved where that leads up.
     """
@@ -410,6 +418,7 @@ def _least(residual: Callable[[float], FloatArray]) -> tuple[float, FloatArray]:
         slope = (residual(x + DIFFERENCE) - left) / DIFFERENCE
         square = float(slope @ slope) or math.inf
         way = float(np.clip(-(slope @ left) / square, -LONGEST, LONGEST))
+        way = max(way, lowest - x)
         for _ in range(4):
             there = residual(x + way)
             if there @ there <= left @ left:

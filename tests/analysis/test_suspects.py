@@ -220,3 +220,25 @@ def test_the_force_of_a_long_run_is_in_pieces_what_it_is_at_once(clock, monkeypa
     time = [pieces[0].time[:1], *(piece.time[1:] for piece in pieces)]
     value = [pieces[0].value[:1], *(piece.value[1:] for piece in pieces)]
     assert Waveform.tidied(np.concatenate(time), np.concatenate(value)) == moved.force
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "told"),
+    [
+        ("force", Estimate(3e-2, 2.3e-5, 2.9955e-2, 3.0046e-2), "(2.995 to 3.005 %"),
+        ("lag", Estimate(8e-3, 3e-7, 7.9994e-3, 8.0006e-3), "(7.9994 to 8.0006 ms"),
+    ],
+)
+def test_the_ends_of_an_interval_are_told_apart(name, size, told):
+    """The force +3 % (3 % to 3 %, 95 %) was no interval."""
+    assert told in Suspect(name, size, 1.0).text
+
+
+@pytest.mark.parametrize("off", [{"V_GS": -4e-3}, {"lag": -4e-3}])
+def test_no_lag_is_less_than_none(off):
+    """Less made no difference to anything, and had an interval of 1e149 s."""
+    found = explained(Deviation(**off))
+    assert found is not None
+    (lag,) = (s for s in found.suspects if s.name == "lag")
+    assert lag.size.value >= -MAGNET.eddy_lag
+    assert lag.size.half < 1.0
