@@ -13,7 +13,7 @@ from tactile_lab.analysis.error_budget import ErrorBudget
 from tactile_lab.analysis.estimate import Estimate, student_95
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.measurement import MeasuredTrial, Measurement
-from tactile_lab.quantity import Duration, Force, Pause, plus_minus, show
+from tactile_lab.quantity import ROUNDING, Duration, Force, Pause, plus_minus, show
 from tactile_lab.stimulus.force import ForceProtocol, pause, step
 from tactile_lab.trial import Trials
 
@@ -105,21 +105,25 @@ class ForceCheck(ForceProtocol):
         left = readings - scale * levels
         freedom = max(1, levels.size - 1)
         error = float(np.sqrt(np.sum(left**2) / freedom / strength))
-        known = Estimate.of(scale, error, freedom)
-        parts: dict[str, float | None] = {"readings": known.half, "force": None}
+        scattered = error > ROUNDING * abs(scale)
+        half = Estimate.of(scale, error, freedom).half if scattered else None
+        parts = {"readings": half, "force": None}
+        known = show(scale, "", 3) if half is None else plus_minus(scale, half)
         said = (
-            f"The force read is {plus_minus(scale, known.half)} (95 %) times that of "
-            "Eq. (2)."
+            f"The force read is {known}{' (95 %)' * scattered} times that of Eq. (2)."
         )
+        if not scattered:
+            alike = "Readings without scatter tell" if levels.size > 1 else "One tells"
+            said += f" {alike} nothing of how far they are off."
         if 0.05 < scale < 0.2:
             said += (
                 " A factor near 0.1 is the area A2: Table 1 prints 2.25e-3 m², a core "
                 "of 15 mm x 15 mm has 2.25e-4 m²."
             )
-        found = {
+        found: dict[str, float | None] = {
             "read_over_eq2": scale,
-            "standard_error": error,
-            "read_over_eq2_uncertainty_95": known.half,
+            "standard_error": error if scattered else None,
+            "read_over_eq2_uncertainty_95": half,
         }
         if run.force_uncertainty is not None:
             shared = run.force_uncertainty
@@ -130,7 +134,8 @@ class ForceCheck(ForceProtocol):
                 " What calibration and geometry leave open in Eq. (2) adds "
                 f"±{open_:.2g} (95 %)."
             )
-        budgets = {"force read over Eq. (2)": ErrorBudget("", parts)}
+        budget = ErrorBudget("", parts)
+        budgets = {"force read over Eq. (2)": budget} if budget.whole else {}
         return Conclusion((said,), found, budgets=budgets)
 
 

@@ -119,6 +119,20 @@ def test_force_check_finds_the_slip_in_table_1():
     assert values["eq2_uncertainty_95"] == pytest.approx(0.1 * values["read_over_eq2"])
 
 
+@pytest.mark.parametrize(
+    ("levels", "readings"), [((0.05,), (0.0051,)), ((0.05, 0.1), (0.05, 0.1))]
+)
+def test_readings_without_scatter_are_no_exact_factor(levels, readings):
+    """One was told as "102 m (95 %) times", known to ±0."""
+    run = modelled("force_check", [pulse(level) for level in levels])
+    read = replace(run, protocol=ForceCheck(levels=levels, readings=readings))
+    found = find(read).conclusion
+    assert "95 %" not in found.sentences[0] and "±" not in found.sentences[0]
+    assert "nothing of how far they are off" in found.sentences[0]
+    assert found.values["read_over_eq2_uncertainty_95"] is None
+    assert not found.budget_line
+
+
 def test_a_teslameter_that_hangs_is_no_exact_one():
     """Its force stood as "0 N" without an uncertainty."""
     run = modelled("force_check", [pulse(0.05)])
