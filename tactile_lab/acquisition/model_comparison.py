@@ -9,7 +9,7 @@ from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.analysis.spike_pairs import match
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import TactileLabError
-from tactile_lab.quantity import rounded
+from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import Outcome
 
@@ -57,10 +57,8 @@ class ModelComparison:
             if inside.any():
                 predicted = out.sample("V_C1", time[inside])
                 off = trace[inside, 1] - predicted
-                told.append(
-                    f"V_C1 {rounded(1e3 * float(off.mean()), '+')} mV "
-                    f"({rounded(1e3 * float(np.sqrt(np.mean(off**2))))} mV rms)"
-                )
+                rms = show(float(np.sqrt(np.mean(off**2))), "V", 2)
+                told.append(f"V_C1 {_signed(float(off.mean()), 'V')} ({rms} rms)")
         except TactileLabError as reason:
             self._model = None
             return f"the model cannot follow any more: {reason}"
@@ -75,10 +73,13 @@ class ModelComparison:
         text = f"{count} spike{'' if count == 1 else 's'} (model {mine.size})"
         offsets = match(outcome.spike_times, mine).offsets
         if offsets.size:
-            text += f", {rounded(1e3 * float(np.median(offsets)), '+')} ms (median"
+            text += f", {_signed(float(np.median(offsets)), 's')} (median"
             if self._doubt > 0:
-                text += (
-                    f"; the coil's steps are known to ±{rounded(1e3 * self._doubt)} ms"
-                )
+                known = show(self._doubt, "s", 2)
+                text += f"; the coil's steps are known to ±{known}"
             text += ")"
         return text
+
+
+def _signed(value: float, unit: str) -> str:
+    return f"{'+' if value > 0 else ''}{show(value, unit, 2)}"

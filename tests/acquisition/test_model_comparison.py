@@ -8,7 +8,7 @@ from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.acquisition.model_comparison import ModelComparison
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.simulate import simulate
-from tactile_lab.quantity import typed
+from tactile_lab.quantity import parse
 from tactile_lab.scene.load import load
 from tactile_lab.trial import Outcome, Trial
 from tactile_lab.waveform import Waveform
@@ -54,7 +54,8 @@ def test_a_trial_like_the_model_s_has_nothing_to_tell_but_that():
     follow(beside)
     told = beside.ended(outcome(Circuit()))
     assert re.match(r"150 mN: measured less model: (\d+) spikes \(model \1\)", told)
-    assert float(typed(re.search(r"\(([\d.e−]+) mV rms", told)[1])) < 0.01
+    assert parse(re.search(r"\(([^()]+ [fpnµm]V) rms\)", told)[1], "V") < 1e-5
+    assert "e−" not in told, "V_C1 −9.3e−05 mV is nothing to read"
 
 
 def test_a_sensor_that_differs_shows_at_once():
