@@ -9,15 +9,19 @@ import numpy as np
 from tactile_lab.analysis.carried_over import Begun, carried_over
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.errors import TactileLabError
-from tactile_lab.measurement import RecordedSignal
+from tactile_lab.measurement import MeasuredTrial, RecordedSignal
 from tactile_lab.model.drain_current import drain_current
 from tactile_lab.plot import Plot
+from tactile_lab.quantity import show
 from tactile_lab.report.drift import drift_plot
 from tactile_lab.report.overview import overview
 from tactile_lab.report.run_data import RunData
 from tactile_lab.report.splice import stretches
 from tactile_lab.report.twin import BesideModel, twin_plot, with_twin
 from tactile_lab.stimulus.force import force_at_zero
+
+ARRIVED = 0.01
+"""Part of a trial's force to which the force applied has to come to be it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -106,6 +110,7 @@ def find(run: RunData) -> Findings:
         missing=(
             *conclusion.missing,
             *_cut_short(run),
+            *_fell_short(complete),
             *_uncounted(run),
             *missing,
         ),
@@ -149,6 +154,32 @@ def _cut_short(run: RunData) -> tuple[str, ...]:
         "it; its row, its fits and the model beside it are of the part before the "
         "run ended.",
     )
+
+
+def _fell_short(run: RunData) -> tuple[str, ...]:
+    """Which trials are filed under a force that never was there."""
+    came = [(trial, _nearest(run, trial)) for trial in run.results if trial.level]
+    told = [
+        f"{trial.label} to {show(at, 'N', 3)}"
+        for trial, at in came
+        if abs(at - (trial.level or 0.0)) > ARRIVED * abs(trial.level or 0.0)
+    ]
+    if not told:
+        return ()
+    return (
+        f"The force did not get there: {', '.join(told)} at the nearest, while the "
+        "source's slew, its set-points and the lags held it back. What stands beside "
+        "that force is of less: let it come slower, or hold it longer.",
+    )
+
+
+def _nearest(run: RunData, trial: MeasuredTrial) -> float:
+    """The force applied in a trial that was nearest to its level, N."""
+    start, end = trial.start, trial.start + trial.duration
+    time, level = run.force.time, trial.level or 0.0
+    points = run.force.value[(time >= start) & (time <= end)]
+    applied = np.append(points, run.force.at([start, end]))
+    return float(applied[np.argmin(np.abs(applied - level))])
 
 
 def _uncounted(run: RunData) -> tuple[str, ...]:

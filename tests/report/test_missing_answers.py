@@ -13,6 +13,7 @@ from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.measurement import CUT_OFF, TOO_FAST, MeasuredTrial
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.plugins import protocol_class
+from tactile_lab.quantity import show
 from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
 from tactile_lab.report.overview import overview
@@ -160,3 +161,21 @@ def test_what_cannot_be_computed_is_said_and_the_rest_is_kept(rate_force, tmp_pa
     assert "Not determined" in report.html.read_text(encoding="utf-8")
     assert sum(t.response.spikes for t in report.findings.run.results) > 30
     assert report.html.exists()
+
+
+def test_a_trial_under_a_force_that_never_came_is_said_to_be(tmp_path):
+    """A press of 20 ms stood as 150 mN without a spike; 12.6 mN had come."""
+    asked = {
+        "protocol.levels": (0.15,),
+        "protocol.ramp": 0.005,
+        "protocol.hold": 0.02,
+        "protocol.rest": 0.2,
+        "record.signals": ("force", "V_K", "spikes"),
+    }
+    found = find(read(Execution(load("demo", asked), tmp_path).run().folder))
+    (said,) = (text for text in found.missing if "did not get there" in text)
+    applied = show(float(found.run.force.value.max()), "N", 3)
+    assert f"150 mN to {applied} at the nearest" in said
+    slow = asked | {"protocol.ramp": 0.25, "protocol.hold": 0.2}
+    there = find(read(Execution(load("demo", slow), tmp_path).run().folder))
+    assert not any("did not get there" in text for text in there.missing)
