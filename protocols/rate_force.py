@@ -112,8 +112,9 @@ def _slope(run: Measurement) -> Conclusion:
     except NotIdentifiableError as reason:
         return Conclusion((), {"slopes": None}, (f"No slope: {reason}.",))
     found: list[tuple[float, Estimate]] = []
-    for t in (min(rated, key=_level), max(rated, key=_level)):
-        level, hold = _level(t), t.hold or (0.0, 0.0)
+    ends = {_level(t): t for t in (min(rated, key=_level), max(rated, key=_level))}
+    for level, t in ends.items():  # one where all forces are equal
+        hold = t.hold or (0.0, 0.0)
         slope, known = law.slope(level, hold[0]), run.uncertain(level)
         if known is not None:  # the force is another there, and so is a newton
             off = 1 + known / level
@@ -127,8 +128,8 @@ def _slope(run: Measurement) -> Conclusion:
         f"The rate at the end of the ramp rises by {told}: the slope of Eq. (15) with "
         f"a V_GS of {plus_minus(law.V_GS.value, law.V_GS.half, 'V')} and "
         f"{plus_minus(law.scale.value, law.scale.half)} of the stated force, fitted to "
-        f"the {law.intervals} intervals in the holds (the circuit's other parameters "
-        "as believed)."
+        f"the {law.intervals} intervals in the holds once node A had followed (the "
+        "circuit's other parameters as believed)."
     )
     values = {
         "slopes": [

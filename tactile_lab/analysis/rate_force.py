@@ -14,7 +14,7 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import I_C, rest_V_C1
-from tactile_lab.quantity import show
+from tactile_lab.quantity import count, show
 
 STEP = 1e-4
 """Force over which a slope is taken, N."""
@@ -154,8 +154,8 @@ def fit_rate_law(
     end = np.concatenate([train[1:] for train in fired] or [np.empty(0)])
     if len(fired) < 2 or start.size < 4:
         raise NotIdentifiableError(
-            f"{start.size} intervals in {len(fired)} holds, 4 in 2 are needed for a "
-            "slope"
+            f"{count(start.size, 'interval')} in {count(len(fired), 'hold')} once node "
+            "A had followed the force, 4 in 2 are needed for a slope"
         )
 
     def fitted(

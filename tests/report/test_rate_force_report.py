@@ -1,10 +1,12 @@
 """What a report concludes from rates at several forces."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from modelled_runs import modelled, pulse, recovery
 
 from tactile_lab.analysis.rate_force import eq15_rate
 from tactile_lab.magnetics import ForceUncertainty
@@ -107,3 +109,21 @@ def test_forces_that_all_fire_give_no_critical_force_but_their_rates(rate_force)
     assert "every force made the sensor fire" in found.missing[0]
     assert found.conclusion.values["critical_force_N"] is None
     assert found.conclusion.values["peak_rate_over_eq15"]
+
+
+def test_equal_forces_have_one_slope():
+    """It was told twice, at 150 mN and at 150 mN."""
+    run = modelled("rate_force", [pulse(0.15), recovery(), pulse(0.15)])
+    found = find(run).conclusion
+    assert [one["force_N"] for one in found.values["slopes"]] == [0.15]
+    assert found.text.count("at 150 mN") == 1
+
+
+def test_too_few_intervals_for_a_slope_are_those_that_count():
+    """Beside a table's 4 intervals in the hold stood "3 intervals in 1 holds"."""
+    (why,) = (
+        text
+        for text in find(modelled("rate_force", [pulse(0.12)])).missing
+        if text.startswith("No slope")
+    )
+    assert re.search(r"\d+ intervals? in 1 hold once node A had followed", why)
