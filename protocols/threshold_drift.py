@@ -15,7 +15,7 @@ from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.quantity import Duration, Force, Pause, Unit, show
+from tactile_lab.quantity import Duration, Force, Pause, Unit, count, show
 from tactile_lab.stimulus.force import step
 from tactile_lab.stimulus.recovery import Recovering
 from tactile_lab.trial import Trials
@@ -83,9 +83,9 @@ class ThresholdDrift(Recovering):
         }  # fmt: skip
         if len(found) < FEWEST:
             said = (
-                f"{len(found)} times a press that fired and a silent one followed each "
-                f"other; {FEWEST} are needed. Begin nearer to the critical force, or "
-                "press more often."
+                f"{count(len(found), 'pair')} of presses held the critical force "
+                f"between them, no press counted twice; {FEWEST} are needed. Begin "
+                "nearer to it, or press more often."
             )
             return Conclusion((), values, (said,))
         forces = np.array([b.middle for b in found])

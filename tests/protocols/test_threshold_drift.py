@@ -99,6 +99,16 @@ def test_too_few_values_give_no_slope():
     assert "drift_N_per_K" not in found.values
 
 
+def test_pairs_are_told_as_they_are_counted():
+    """Of presses that fired and did not by turns, 5 times, "3 times" was told."""
+    protocol = ThresholdDrift(begin=0.098, presses=6)
+    run = followed(protocol, lambda i: 0.0975)
+    fired = [bool(t.spike_times.size) for t in run.results]
+    assert fired == [True, False] * 3
+    (why,) = protocol.conclude(run).missing
+    assert why.startswith("3 pairs of presses") and "no press counted twice" in why
+
+
 def test_a_temperature_that_stands_still_is_said():
     protocol = ThresholdDrift(presses=20)
     run = followed(protocol, lambda i: 0.1004, kelvin=lambda i: 290.0)
