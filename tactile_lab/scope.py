@@ -100,6 +100,8 @@ class ScopeCapability:
         inputs: names of its inputs.
         ranges: full-scale ranges, V.
         bits: resolution of its converter.
+        steps: of it from 0 to full scale, where that is not all it has, as where full
+            scale is the edge of a screen.
         fastest: highest streaming rate for 1, 2, ... enabled channels, S/s.
         offsets: largest analogue offset at each of `ranges`, V, either sign; empty
             where only the open scope tells.
@@ -113,6 +115,12 @@ class ScopeCapability:
     fastest: tuple[float, ...]
     offsets: tuple[float, ...] = ()
     generator: GeneratorCapability | None = None
+    steps: int | None = None
+
+    @property
+    def codes(self) -> int:
+        """From 0 to full scale."""
+        return self.steps or 2 ** (self.bits - 1) - 1
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,10 +23,10 @@ class InputCard(QFrame):
 
     changed = Signal()
 
-    def __init__(self, table: Channel, ranges: tuple[float, ...], bits: int) -> None:
+    def __init__(self, table: Channel, ranges: tuple[float, ...], codes: int) -> None:
         super().__init__()
         self.setProperty("role", "card")
-        self._table, self._bits = table, bits
+        self._table, self._codes = table, codes
         name = f"{table.input} · {table.signal}"
         self.range = Combo()
         for value in ranges:
@@ -71,7 +71,7 @@ class InputCard(QFrame):
         try:
             middle = -parse(self.offset.text(), "V")
             low, high = (round(middle + sign * full, 9) for sign in (-1, 1))
-            code = show(2 * full / 2**self._bits, "V", 2)
+            code = show(full / self._codes, "V", 2)
             span = printed(f"{low:.4g} to {high:.4g} V")
             self._sees.setText(f"{span} · {code} a code")
         except QuantityError as error:
@@ -109,12 +109,12 @@ class ScopeInputs(QWidget):
             return
         try:
             capability = scope_capability(scope)
-            ranges, bits = capability.ranges, capability.bits
+            ranges, codes = capability.ranges, capability.codes
         except SceneError as error:
-            ranges, bits = tuple(sorted({one.range for one in scope.channels})), 8
+            ranges, codes = tuple(sorted({one.range for one in scope.channels})), 127
             self.say(str(error))
         for table in scope.channels:
-            card = InputCard(table, ranges, bits)
+            card = InputCard(table, ranges, codes)
             card.changed.connect(self._buttons)
             self.cards.append(card)
             self._rows.addWidget(card)

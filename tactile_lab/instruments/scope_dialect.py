@@ -113,6 +113,7 @@ class ScopeDialect(Dialect):
             bits=self.bits,
             fastest=self.fastest,
             offsets=self.offsets,
+            steps=self.divisions_high * self.codes_per_division,
         )
 
     def timebase(self, interval: float, inputs: int) -> float:

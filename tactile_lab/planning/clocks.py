@@ -50,7 +50,8 @@ def clocks(scene: Scene, needed: Needs, drive: Timeline) -> Iterator[str]:
     if any(s.drive is not None and s.drive.points is not None for s in drive.steps):
         return
     sizes = _set_points(drive, exchange)
-    noise, codes = _noise(scene, abs(shunt.scale)), VISIBLE_CODES * resolution(shunt)
+    noise = _noise(scene, abs(shunt.scale))
+    codes = VISIBLE_CODES * resolution(scene, shunt)
     visible = max(VISIBLE, codes)
     lag = scene.bench.magnet.coil_lag
     bands = [

@@ -10,7 +10,7 @@ widest registers.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -170,7 +170,7 @@ def set_points(drive: Timeline, interval: float | None) -> float:
 
 
 def savings(
-    scene: Scene, needed: Needs, cost: Computing, samples: int, disk: float
+    scene: Scene, needed: Needs, cost: Computing, packed: Mapping[str, float]
 ) -> Iterator[Saving]:
     """What each thing saves that the scene could leave out and still run.
 
@@ -178,13 +178,12 @@ def savings(
         scene: planned.
         needed: what is opened and stored.
         cost: of the whole.
-        samples: of one channel.
-        disk: of all stored channels, compressed, bytes.
+        packed: bytes of each stored channel, compressed.
     """
     storing = cost.time.get("storing", 0.0)
     number = len(needed.stored)
     wired = {channel.signal for channel in needed.channels}
-    for signal in needed.stored if samples and number > 1 else ():
+    for signal in needed.stored if number > 1 else ():
         names = [signal] if signal in scene.record.signals else []
         if signal == "V_C1" and "I_DS" in scene.record.signals and "I_DS" not in wired:
             names.append("I_DS")
@@ -192,7 +191,7 @@ def savings(
         how = "without {} in record.signals".format(
             " and ".join(f'"{n}"' for n in names)
         )
-        yield Saving(what, how, disk / number, storing / number)
+        yield Saving(what, how, packed[signal], storing / number)
     beside = cost.time.get("model beside the run")
     if beside is not None:
         beside += cost.time.get("search for a cause", 0.0)

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from tactile_lab.bench import CoilLimits
-from tactile_lab.instruments.registry import coil_capability
+from tactile_lab.instruments.registry import coil_capability, scope_capability
 from tactile_lab.planning.heat import cool_down, heat_along
 from tactile_lab.planning.needs import Needs
 from tactile_lab.planning.outcome import Step
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.scene.scene import Scene
-from tactile_lab.scope import Channel
+from tactile_lab.scope import Channel, ScopeCapability
 from tactile_lab.waveform import Waveform
 
-BYTES_PER_SAMPLE = 2
-COMPRESSION = 6.0
-"""How much smaller 8-bit codes with a code of noise become (measured: 6.1 to 6.7)."""
+OF_NOISE, FALLS, GROWS = 0.43, 0.7, 1 / 8
+"""Bytes that a code takes once compressed: 0.43 with one code of noise, which fall with
+the noise as its power of 0.7, and grow by a bit as it doubles (measured from 0.05 codes
+to 40, within a quarter)."""
+OF_BLOCKS = 0.009
+"""Bytes of it that take the blocks of codes that are all alike (measured)."""
+UNKNOWN_NOISE = 1.0
+"""Codes, of a channel on a real bench."""
 REPORT = 0.5e6, 3.5e6
 """Bytes that tables, figures and report take in a short run, least and most (measured:
 0.6 MB of one trial without spikes, 3.4 MB of `bipolar`)."""
@@ -30,8 +36,8 @@ REWRITTEN = 0.5
 SWITCHED_ON = 4.5
 """Intervals between two set-points that it takes to switch the coil on as samples are
 taken already (measured: 4.5 of a Kepco)."""
-CODES = 127
-"""Steps of an 8-bit converter from 0 to full scale."""
+NARROW = 8
+"""Bits of a converter up to which a code is stored in one byte, else in two."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +50,8 @@ class Cost:
         trials: how many.
         samples_per_channel: taken of each enabled channel.
         samples_stored: of all stored channels together.
-        disk_raw, disk: bytes of samples before and after compression.
+        disk_raw: bytes of samples before compression.
+        packed: bytes of the samples of each stored channel, compressed.
         disk_beside: bytes that the rest takes, least and most.
         peak_force, peak_current: largest magnitudes, N and A.
         heat, heat_budget: largest leaky I^2 t and what is allowed, A^2 s.
@@ -61,7 +68,7 @@ class Cost:
     samples_per_channel: int
     samples_stored: int
     disk_raw: int
-    disk: int
+    packed: dict[str, float]
     disk_beside: tuple[int, int]
     peak_force: float
     peak_current: float
@@ -72,6 +79,11 @@ class Cost:
     step_current: float
     step_force: float
     resolution: dict[str, float]
+
+    @property
+    def disk(self) -> int:
+        """Bytes of all samples, compressed."""
+        return round(sum(self.packed.values()))
 
 
 def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
@@ -89,10 +101,11 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
     if not needed.channels:
         samples = 0
     stored = samples * len(needed.stored)
-    raw = stored * BYTES_PER_SAMPLE
+    each = {c.signal: packed(scene, c) for c in needed.channels}
+    each = {name: each[name] for name in needed.stored}
     breaks = sum(_stops_stream(step) for step in drive.steps) if stored else 0
-    again = REWRITTEN * scene.record.sample_rate * len(needed.stored) * BYTES_PER_SAMPLE
-    most = REPORT[1] + PYRAMID * stored + breaks * again / COMPRESSION
+    again = REWRITTEN * scene.record.sample_rate * sum(each.values())
+    most = REPORT[1] + PYRAMID * stored + breaks * again
     step = 0.0 if interval is None else largest_step(current, interval)
     return Cost(
         duration=drive.duration + before,
@@ -100,8 +113,8 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
         trials=len(drive.steps),
         samples_per_channel=samples,
         samples_stored=stored,
-        disk_raw=raw,
-        disk=round(raw / COMPRESSION),
+        disk_raw=stored * _width(scene) if stored else 0,
+        packed={name: samples * size for name, size in each.items()},
         disk_beside=(round(REPORT[0] + PYRAMID * stored), round(most)),
         peak_force=drive.force.peak,
         peak_current=current.peak,
@@ -111,7 +124,7 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
         update_interval=interval,
         step_current=step,
         step_force=step * abs(scene.bench.magnet.newtons_per_ampere),
-        resolution={c.signal: resolution(c) for c in needed.channels},
+        resolution={c.signal: resolution(scene, c) for c in needed.channels},
     )
 
 
@@ -120,9 +133,31 @@ def _stops_stream(step: Step) -> bool:
     return step.trial.pause or (step.drive is not None and step.drive.load > 0)
 
 
-def resolution(channel: Channel) -> float:
-    """One code of an 8-bit converter on that channel, in the signal's unit."""
-    return channel.range / CODES * abs(channel.scale)
+def resolution(scene: Scene, channel: Channel) -> float:
+    """One code of the scope's converter on that channel, in the signal's unit."""
+    return channel.range / _scope(scene).codes * abs(channel.scale)
+
+
+def packed(scene: Scene, channel: Channel) -> float:
+    """Bytes of one code of a channel, compressed: what its noise leaves of them."""
+    noise = UNKNOWN_NOISE
+    if scene.bench.simulated:
+        volts = scene.simulated.noise.get(channel.signal, 0.0)
+        noise = volts / channel.range * _scope(scene).codes
+    more = GROWS * math.log2(max(1.0, noise))
+    size = OF_BLOCKS + OF_NOISE * math.pow(min(1.0, noise), FALLS) + more
+    return min(float(_width(scene)), size)
+
+
+def _width(scene: Scene) -> int:
+    """Bytes of one code as it is stored."""
+    return 1 if _scope(scene).bits <= NARROW else 2
+
+
+def _scope(scene: Scene) -> ScopeCapability:
+    """What the scope can of a scene that has a channel."""
+    assert scene.bench.scope is not None
+    return scope_capability(scene.bench.scope)
 
 
 def largest_step(wave: Waveform, interval: float) -> float:

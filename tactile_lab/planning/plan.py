@@ -101,16 +101,8 @@ class Plan:
     @property
     def savings(self) -> tuple[Saving, ...]:
         """What each thing saves that could be left out."""
-        cost = self.estimate
-        return tuple(
-            savings(
-                self.scene,
-                self.needs,
-                self.computing,
-                cost.samples_per_channel,
-                cost.disk,
-            )
-        )
+        told = savings(self.scene, self.needs, self.computing, self.estimate.packed)
+        return tuple(told)
 
     @property
     def suggestions(self) -> tuple[str, ...]:

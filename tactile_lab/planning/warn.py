@@ -128,7 +128,7 @@ def threshold_of(scene: Scene) -> float:
         return threshold
     scope = scene.bench.scope
     wired = scope.channels if scope is not None else ()
-    step = max((resolution(c) for c in wired if c.signal == "V_K"), default=0.0)
+    step = max((resolution(scene, c) for c in wired if c.signal == "V_K"), default=0.0)
     if not scene.bench.simulated:
         return DEVIATIONS * step / 2
     noise, hum = scene.simulated.noise.get("V_K", 0.0), scene.simulated.hum
@@ -248,7 +248,7 @@ def _field(scene: Scene, needed: Needs, drive: Timeline) -> Iterator[str]:
             f"{channel.input} sees {show(low, 'T')} to {show(high, 'T')}; the run ends "
             "as faulted where it is exceeded. Choose a larger range."
         )
-    elif (step := resolution(channel)) > FINE * field:
+    elif (step := resolution(scene, channel)) > FINE * field:
         yield (
             f"one code of the field channel is {show(step, 'T')}, more than "
             f"{FINE:.0%} of the {show(field, 'T')} expected. Choose a smaller range of "
@@ -283,10 +283,10 @@ def cheaper(
             f'(record.sample_rate = "{wanted}")'
         )
     if needed.detect_on is not None and needed.detect_on in needed.stored:
-        part = 1 / len(needed.stored)
+        saved = bytes_text(cost.packed[needed.detect_on])
         yield (
             f"spikes are found as {needed.detect_on} streams: its samples need not be "
-            f"stored to have them; saves {bytes_text(part * cost.disk)} of disk "
+            f"stored to have them; saves {saved} of disk "
             f"(then they cannot be looked for again)"
         )
 

@@ -33,7 +33,7 @@ def test_the_demo_needs_four_channels_and_no_teslameter():
     # 0.1 s of rest, and the time to switch the coil on, come before the trials' 18 s
     assert (cost.duration, cost.trials) == (pytest.approx(18.304609, abs=1e-6), 4)
     assert cost.samples_per_channel == 18_304_609
-    assert cost.disk_raw == 18_304_609 * 4 * 2
+    assert cost.disk_raw == 18_304_609 * 4
     assert cost.peak_current == pytest.approx(0.997, abs=1e-3)
     assert 0 < cost.heat < cost.heat_budget == 30.0
     assert 15 < 1 / cost.update_interval < 40

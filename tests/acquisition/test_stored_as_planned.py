@@ -1,0 +1,39 @@
+"""What a plan says of a run's size and codes, beside what the run then has stored."""
+
+import h5py
+import pytest
+from benches import WITH_GAPS
+
+from tactile_lab.planning.plan import plan
+from tactile_lab.scene.load import load
+
+QUIET = [f"simulated.noise.{name}=0 V" for name in ("V_C1", "V_C2", "V_K")]
+QUIET = [*QUIET, "simulated.noise.coil_current=0 V"]
+LOUD = [f"simulated.noise.{name}=100 mV" for name in ("V_C1", "V_C2")]
+LOUD = [*LOUD, "simulated.noise.coil_current=10 mV"]
+
+
+@pytest.mark.parametrize("noise", [QUIET, [], LOUD], ids=["none", "usual", "much"])
+def test_bytes_of_samples_are_those_that_a_run_then_stores(noise, run_scene, short):
+    keys = (*short, "record.sample_rate=4 MS/s", *noise)
+    told = plan(load("demo", keys), preview=False).estimate
+    with h5py.File(run_scene(*keys).folder / "data.h5") as file:
+        stored = [samples for samples in file["samples"].values()]
+        wide = sum(one.size * one.dtype.itemsize for one in stored)
+        packed = sum(one.id.get_storage_size() for one in stored)
+    assert told.disk_raw == pytest.approx(wide, rel=0.02)
+    assert 1 / 1.5 < told.disk / packed < 1.5
+
+
+def test_one_code_is_that_of_the_scope_that_the_bench_has(run_scene, tmp_path):
+    """A screen's edge is 100 codes from its middle, a PicoScope's range 127."""
+    (tmp_path / "gaps.toml").write_text(WITH_GAPS, encoding="utf-8")
+    keys = (
+        'record.signals=["V_C1", "coil_current"]',
+        "record.compare=false",
+        f"bench.file={tmp_path / 'gaps.toml'}",
+        "protocol.duration=0.5 s",
+    )
+    told = plan(load("monitor", keys), preview=False).estimate.resolution
+    run = run_scene(*keys, scene="monitor").stored()
+    assert told["V_C1"] == pytest.approx(run.signal("V_C1").gain)
