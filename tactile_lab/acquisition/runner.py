@@ -63,6 +63,8 @@ class Runner:
         missing: what found that samples are missing from a stream without gaps; None
             where nothing did.
         surplus: what found that there are more samples than time went by for.
+        duration: of the experiment, planned pauses included, until the coil began to be
+            made safe, s.
     """
 
     def __init__(
@@ -100,13 +102,9 @@ class Runner:
         )
         self.missing: str | None = None
         self.surplus: str | None = None
+        self.duration = 0.0
         self._place_probes = bench.place_probes
         self._probes = "circuit"
-
-    @property
-    def duration(self) -> float:
-        """Length of the run so far, planned pauses included, s."""
-        return self._account.now
 
     def run(self) -> Ending:
         """Run to the end, however it comes; the coil is safe when this returns."""
@@ -123,6 +121,7 @@ class Runner:
             except BaseException as error:
                 state, failure = events.RunState.FAULTED, error
                 reason = self._program.fault(error)
+            self.duration = self._account.now
             try:
                 self._account.state(events.RunState.STOPPING, "making the coil safe")
             finally:  # whatever the record does

@@ -37,3 +37,18 @@ def test_one_code_is_that_of_the_scope_that_the_bench_has(run_scene, tmp_path):
     told = plan(load("monitor", keys), preview=False).estimate.resolution
     run = run_scene(*keys, scene="monitor").stored()
     assert told["V_C1"] == pytest.approx(run.signal("V_C1").gain)
+
+
+def test_a_run_lasts_as_long_as_planned_and_has_one_duration(run_scene):
+    """Making the coil safe takes as long again as a short push, and is none of it."""
+    keys = (
+        'protocol.levels=["100 mN"]',
+        "protocol.ramp=0.1 s",
+        "protocol.hold=0.1 s",
+        "protocol.rest=0.1 s",
+    )
+    told = plan(load("demo", keys), preview=False).estimate
+    ran = run_scene(*keys)
+    run = ran.stored()
+    assert ran.done.duration == pytest.approx(told.duration, rel=0.02)
+    assert ran.done.duration == run.info["duration_s"] == pytest.approx(run.duration)
