@@ -44,6 +44,7 @@ def warnings(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]:
         *_model_only(scene),
         *_ways(scene, drive),
         *_spike_sampling(scene, needed),
+        *_spikes_cut(scene, needed),
         *_noise(scene, needed, drive.streamed),
         *_scope(scene, needed),
         *_shunt(needed, drive),
@@ -160,6 +161,20 @@ def _spike_sampling(scene: Scene, needed: Needs) -> Iterator[str]:
             f"takes {show(interval, 's')}. Sample at "
             f"{show(_round_up(2 / width), 'S/s')} or faster."
         )
+
+
+def _spikes_cut(scene: Scene, needed: Needs) -> Iterator[str]:
+    """That spikes are higher than their channel sees; a sensor may always fire."""
+    channel = next((c for c in needed.channels if c.signal == "V_K"), None)
+    height = scene.circuit.fire_voltage - scene.circuit.reset_voltage
+    if channel is None or channel.coupling != "DC" or height <= channel.span[1]:
+        return
+    low, high = (show(end, "V") for end in channel.span)
+    yield (
+        f"V_K rises to {show(height, 'V')} at a spike, scope input {channel.input} "
+        f"sees {low} to {high}: it is cut off there, and heights of spikes are not "
+        "told. Choose a larger range."
+    )
 
 
 def _amplitudes(scene: Scene, needed: Needs) -> Iterator[str]:

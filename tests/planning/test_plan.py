@@ -2,6 +2,7 @@
 
 import json
 from importlib import resources
+from pathlib import Path
 
 import pytest
 from peak_memory import peak, tells_peak
@@ -205,6 +206,17 @@ def test_a_range_is_widened_where_the_model_expects_more(fixed_ranges):
     assert ranges("hold_10s")["V_C2"] == 2.0
     # without a force nothing is expected beyond
     assert ranges("monitor")["V_C1"] == 2.0
+
+
+def test_spikes_that_leave_the_range_of_v_k_are_foreseen(fixed_ranges):
+    bench = Path(fixed_ranges)
+    text = bench.read_text()
+    assert "V_K" not in " ".join(plan(load(bench=fixed_ranges)).warnings)
+    bench.write_text(
+        text.replace('input = "C"\nrange = "5 V"', 'input = "C"\nrange = "2 V"')
+    )
+    told = " ".join(plan(load(bench=fixed_ranges), preview=False).warnings)
+    assert "V_K rises to 3.213 V at a spike, scope input C sees −2 V to 2 V" in told
 
 
 def test_a_coil_current_beyond_its_channel_is_foreseen():
