@@ -18,6 +18,7 @@ import numpy as np
 
 from tactile_lab.deviation import Deviation
 from tactile_lab.planning.needs import Needs, compared
+from tactile_lab.planning.outcome import Step
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.scene.scene import Scene
 
@@ -30,30 +31,32 @@ START, FITTED = 3.7, 0.95
 and the fits to them add where any are expected, s."""
 PER_TRIAL = 0.012
 """Played, judged and drawn, s."""
-PER_STREAMED_SECOND, DRIVEN = 0.03, 0.023
-"""Of blocks that are handed on, at any rate, and of a source that is read back, s."""
+PER_CHANNEL_SECOND, DRIVEN, SET = 5.5e-3, 4.5e-3, 2e-3
+"""Of one channel's blocks that are handed on, at any rate; of a source that rests and
+is read back; and of each set-point while it does not, s."""
 PER_HELD_SECOND = 5.8e-3
 """Of one source meter, which is read back in pauses too, s."""
 STORED, DETECTED = 0.006, 0.006
 """Per million samples of one channel: rendered, compressed, read again and drawn; and
 of the one on which spikes are looked for, s."""
-COMPARED, COMPARED_TRIAL = 0.32, 0.05
-COMPARED_POINT, COMPARED_SPIKE = 1.33e-3, 3.3e-3
+COMPARED, COMPARED_TRIAL = 0.32, 0.035
+COMPARED_POINT, COMPARED_SPIKE = 1.33e-3, 1.2e-3
 """Of the model beside the run, which is solved once as it is believed and once for each
 cause of uncertainty: with its figure, per trial, per set-point or point of a list, and
-per spike, s."""
-SEARCHED, SEARCHED_SPIKE = 1.4, 0.045
+per spike that counts, s."""
+SEARCHED, SEARCHED_SPIKE = 1.4, 0.035
 """Of the search for what explains a misfit, and per spike, s. It can be foreseen only
 where the scene itself has the simulated bench deviate."""
 
-BASE = 270e6
+BASE = 290e6
 """Memory of the program with its instruments and figures, bytes."""
-MEMORY_CHANNEL = 12e6
+MEMORY_CHANNEL = 6e6
 """What is kept of a channel's stream, bytes."""
 MEMORY_MILLION = 15e3
 """Per million samples of one channel: of pyramids, live and stored, bytes."""
-MEMORY_POINT = 1.5e3
-"""Per set-point or point of a list: the force it makes, behind the lags, bytes."""
+MEMORY_COMPARED, MEMORY_POINT = 62e6, 25e3
+"""Of the model beside the run, and per set-point or point of a list of the trial that
+has most of them: the force they make, behind the lags, bytes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,17 +116,21 @@ def computing(
         scene: with what it compares.
         needed: channels and what is stored of them.
         drive: its trials.
-        spikes: expected.
+        spikes: expected to count.
         interval: between two set-points of the coil, s; None without a coil.
     """
     slow = slowness()
     millions = drive.streamed * scene.record.sample_rate / 1e6
-    points = set_points(drive, interval)
+    points = [set_points(step, interval) for step in drive.steps]
+    listed = sum(step.listed for step in drive.steps)
     told = {
         "start and report": (
             START + (FITTED if spikes else 0.0) + PER_TRIAL * len(drive.steps)
         ),
-        "streaming": (PER_STREAMED_SECOND + DRIVEN * needed.coil) * drive.streamed,
+        "streaming": PER_CHANNEL_SECOND * len(needed.channels) * drive.streamed,
+        "coil source": (
+            DRIVEN * needed.coil * drive.streamed + SET * (sum(points) - listed)
+        ),
         "source meters": PER_HELD_SECOND * drive.duration * len(needed.voltages),
         "storing": STORED * millions * len(needed.stored),
     }
@@ -135,10 +142,10 @@ def computing(
         told["model beside the run"] = (
             COMPARED
             + COMPARED_TRIAL * len(drive.steps)
-            + COMPARED_POINT * points
+            + COMPARED_POINT * sum(points)
             + COMPARED_SPIKE * spikes
         )
-        memory += MEMORY_POINT * points
+        memory += MEMORY_COMPARED + MEMORY_POINT * max(points, default=0.0)
         if not scene.circuit.saturation and _surprises(scene):
             told["search for a cause"] = SEARCHED + SEARCHED_SPIKE * spikes
     time_ = {part: slow * seconds for part, seconds in told.items() if seconds}
@@ -148,25 +155,23 @@ def computing(
 def _surprises(scene: Scene) -> bool:
     """Whether a simulated bench is other than the model beside it believes."""
     world = scene.simulated
-    other = world.specimen, world.hysteresis, world.attraction
+    other = world.specimen, world.hysteresis, world.attraction, world.warming
     return scene.bench.simulated and (any(other) or world.deviation != Deviation())
 
 
-def set_points(drive: Timeline, interval: float | None) -> float:
-    """Points of lists, and set-points while the current changes: each moves the force.
+def set_points(step: Step, interval: float | None) -> float:
+    """Points of a list, or set-points while the current changes: each moves the force.
 
     Args:
-        drive: trials of a run.
+        step: a trial of a run.
         interval: between two set-points, s; None without a coil.
     """
-    number = 0.0
-    for step in drive.steps:
-        if step.drive is not None and step.drive.points is not None:
-            number += len(step.drive.points)
-        elif step.current is not None and interval:
-            moving = np.diff(step.current.value) != 0
-            number += float(np.diff(step.current.time)[moving].sum()) / interval
-    return number
+    if step.listed:
+        return step.listed
+    if step.current is None or not interval:
+        return 0.0
+    moving = np.diff(step.current.value) != 0
+    return float(np.diff(step.current.time)[moving].sum()) / interval
 
 
 def savings(
@@ -180,8 +185,9 @@ def savings(
         cost: of the whole.
         packed: bytes of each stored channel, compressed.
     """
-    storing = cost.time.get("storing", 0.0)
     number = len(needed.stored)
+    stored = cost.time.get("storing", 0.0) / max(number, 1)
+    streamed = cost.time.get("streaming", 0.0) / max(len(needed.channels), 1)
     wired = {channel.signal for channel in needed.channels}
     for signal in needed.stored if number > 1 else ():
         names = [signal] if signal in scene.record.signals else []
@@ -191,7 +197,9 @@ def savings(
         how = "without {} in record.signals".format(
             " and ".join(f'"{n}"' for n in names)
         )
-        yield Saving(what, how, packed[signal], storing / number)
+        left_out = signal != needed.detect_on  # else it is streamed all the same
+        seconds = stored + left_out * streamed
+        yield Saving(what, how, packed[signal], seconds)
     beside = cost.time.get("model beside the run")
     if beside is not None:
         beside += cost.time.get("search for a cause", 0.0)

@@ -17,8 +17,8 @@ from tactile_lab.scene.scene import Scene
 from tactile_lab.scope import Channel, ScopeCapability
 from tactile_lab.waveform import Waveform
 
-OF_NOISE, FALLS, GROWS = 0.43, 0.7, 1 / 8
-"""Bytes that a code takes once compressed: 0.43 with one code of noise, which fall with
+OF_NOISE, FALLS, GROWS = 0.46, 0.7, 1 / 8
+"""Bytes that a code takes once compressed: 0.46 with one code of noise, which fall with
 the noise as its power of 0.7, and grow by a bit as it doubles (measured from 0.05 codes
 to 40, within a quarter)."""
 OF_BLOCKS = 0.009

@@ -42,6 +42,13 @@ class Step:
     drive: Drive | None = None
     voltages: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def listed(self) -> int:
+        """Points of the list that plays it; 0 where none does."""
+        if self.drive is None or self.drive.points is None:
+            return 0
+        return len(self.drive.points)
+
 
 class ModelAlong:
     """The model along the steps of a plan, solved a step at a time as it is asked for.

@@ -15,7 +15,7 @@ from tactile_lab.planning.needs import Needs, needs
 from tactile_lab.planning.ranges import beyond
 from tactile_lab.planning.reasons import Reasons, leaves_out, uses
 from tactile_lab.planning.timeline import Timeline, timeline
-from tactile_lab.planning.warn import assumptions, cheaper, warnings
+from tactile_lab.planning.warn import assumptions, cheaper, misses_spikes, warnings
 from tactile_lab.planning.ways import WayInstead, WayUsed, ways_instead, ways_used
 from tactile_lab.quantity import bytes_text, count, rounded, show
 from tactile_lab.scene.scene import Scene
@@ -79,11 +79,12 @@ class Plan:
     @cached_property
     def computing(self) -> Computing:
         """Processor time and memory the run takes on this computer."""
+        spikes = self.timeline.spikes if self.spikes is None else self.spikes
         return computing(
             self.scene,
             self.needs,
             self.timeline,
-            self.timeline.spikes if self.spikes is None else self.spikes,
+            0 if misses_spikes(self.scene, self.needs) else spikes,
             self.estimate.update_interval,
         )
 

@@ -81,7 +81,7 @@ def test_the_model_beside_a_run_is_planned_and_can_be_left_out(tmp_path):
 def test_a_plan_tells_its_numerical_error_and_what_a_signal_costs():
     told = text(plan(load("demo")))
     assert re.search(r"numerics +spike times within .* by the solver's own", told)
-    assert re.search(r'no V_C2 +3.7 MB of disk and .* without "V_C2" in record', told)
+    assert re.search(r'no V_C2 +3.94 MB of disk and .* without "V_C2" in record', told)
     assert re.search(r"no model beside the run .* record.compare = false", told)
 
 

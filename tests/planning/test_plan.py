@@ -4,6 +4,7 @@ import json
 from importlib import resources
 from pathlib import Path
 
+import numpy as np
 import pytest
 from peak_memory import peak, tells_peak
 
@@ -415,6 +416,40 @@ def test_what_a_run_computes_is_the_sum_of_its_parts_and_each_can_be_left_out():
     assert without.computing.memory < cost.memory
 
 
+SHORT_SPIKES = ["sensor.C2=10 pF", "sensor.V_GS=1.45 V", "protocol.level=300 mN"]
+"""Six thousand, of which most fall between two samples."""
+LONG = "protocol.hold=1200 s"
+
+
+@pytest.mark.parametrize(
+    ("keys", "seconds", "memory"),
+    [
+        (["protocol.level=5 mN", LONG, "record.sample_rate=100 kS/s"], 43.1, 399e6),
+        (["protocol.level=118 mN", LONG, 'record.signals=["spikes"]'], 27.6, 354e6),
+        (SHORT_SPIKES, 6.1, 383e6),
+    ],
+    ids=["twenty minutes", "one channel", "uncounted spikes"],
+)
+def test_what_long_holds_and_many_spikes_cost_is_foreseen(keys, seconds, memory):
+    """As measured, on a computer of 1: what rests or is not counted costs less."""
+    cost = plan(load("hold_10s", keys)).computing
+    assert 1 / 1.5 < cost.seconds / slowness() / seconds < 1.5
+    assert 1 / 1.5 < cost.memory / memory < 1.5
+
+
+def test_what_a_force_that_never_rests_costs_is_foreseen(tmp_path):
+    """Its model is solved whole, with all its set-points; measured as those above."""
+    time = np.arange(0, 300, 0.05)
+    force = 0.09 + 0.08 * np.sin(1.3 * time) * np.sin(0.11 * time)
+    rows = [f"{t:.3f},{f:.6f}" for t, f in zip(time, force, strict=True)]
+    file = tmp_path / "force.csv"
+    file.write_text("\n".join(["time_s,force_N", *rows]), encoding="utf-8")
+    keys = [f"protocol.file={file}", "record.sample_rate=50 kS/s"]
+    cost = plan(load("waveform", keys)).computing
+    assert 1 / 1.5 < cost.seconds / slowness() / 39.1 < 1.5
+    assert 1 / 1.5 < cost.memory / 582e6 < 1.5
+
+
 def test_what_a_source_meter_and_the_fits_of_a_trim_cost_is_foreseen():
     """Without a preview too; it took 5.7 s on a computer of 0.62 (plan-figures.md)."""
     planned = plan(load("threshold_trim"))
@@ -433,7 +468,7 @@ def test_a_search_is_foreseen_where_the_scene_has_its_bench_deviate():
     assert saved["model beside the run"].seconds == pytest.approx(left)
     assert "search for a cause" not in less.time
     assert "search for a cause" not in plan(load()).computing.time
-    for other in ("specimen=9", "hysteresis=50 mA"):
+    for other in ("specimen=9", "hysteresis=50 mA", "warming=5 K"):
         found = plan(load(None, [f"simulated.{other}"])).computing
         assert "search for a cause" in found.time
     saturated = plan(load("surprise", ["sensor.saturation=true"])).computing
