@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, Protocol
 
@@ -102,6 +102,8 @@ class ScopeCapability:
         bits: resolution of its converter.
         steps: of it from 0 to full scale, where that is not all it has, as where full
             scale is the edge of a screen.
+        record: how long one lasts, s, and its samples of a channel, at a wanted
+            interval in s and with so many inputs; None for a stream without gaps.
         fastest: highest streaming rate for 1, 2, ... enabled channels, S/s.
         offsets: largest analogue offset at each of `ranges`, V, either sign; empty
             where only the open scope tells.
@@ -116,6 +118,7 @@ class ScopeCapability:
     offsets: tuple[float, ...] = ()
     generator: GeneratorCapability | None = None
     steps: int | None = None
+    record: Callable[[float, int], tuple[float, int]] | None = None
 
     @property
     def codes(self) -> int:

@@ -114,7 +114,13 @@ class ScopeDialect(Dialect):
             fastest=self.fastest,
             offsets=self.offsets,
             steps=self.divisions_high * self.codes_per_division,
+            record=self.record,
         )
+
+    def record(self, interval: float, inputs: int) -> tuple[float, int]:
+        """How long a record lasts, s, and its samples of a channel; as `timebase`."""
+        screen = self.timebase(interval, inputs) * self.divisions_wide
+        return screen, self.depth[inputs]
 
     def timebase(self, interval: float, inputs: int) -> float:
         """The longest s a division that samples at least as often as wanted.

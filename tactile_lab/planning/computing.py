@@ -17,6 +17,7 @@ from functools import cache
 import numpy as np
 
 from tactile_lab.deviation import Deviation
+from tactile_lab.planning.estimate import Cost
 from tactile_lab.planning.needs import Needs, compared
 from tactile_lab.planning.outcome import Step
 from tactile_lab.planning.timeline import Timeline
@@ -108,7 +109,7 @@ def slowness() -> float:
 
 
 def computing(
-    scene: Scene, needed: Needs, drive: Timeline, spikes: int, interval: float | None
+    scene: Scene, needed: Needs, drive: Timeline, spikes: int, cost: Cost
 ) -> Computing:
     """What running `scene` on the simulated bench costs; a real bench costs no more.
 
@@ -117,11 +118,11 @@ def computing(
         needed: channels and what is stored of them.
         drive: its trials.
         spikes: expected to count.
-        interval: between two set-points of the coil, s; None without a coil.
+        cost: samples, and the time between two set-points of the coil.
     """
     slow = slowness()
-    millions = drive.streamed * scene.record.sample_rate / 1e6
-    points = [set_points(step, interval) for step in drive.steps]
+    millions = cost.samples_per_channel / 1e6
+    points = [set_points(step, cost.update_interval) for step in drive.steps]
     listed = sum(step.listed for step in drive.steps)
     told = {
         "start and report": (

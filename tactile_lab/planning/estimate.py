@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tactile_lab.arrays import FloatArray
 from tactile_lab.bench import CoilLimits
 from tactile_lab.instruments.registry import coil_capability, scope_capability
 from tactile_lab.planning.heat import cool_down, heat_along
@@ -15,6 +16,7 @@ from tactile_lab.planning.outcome import Step
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scope import Channel, ScopeCapability
+from tactile_lab.trial import BASELINE
 from tactile_lab.waveform import Waveform
 
 OF_NOISE, FALLS, GROWS = 0.46, 0.7, 1 / 8
@@ -36,6 +38,8 @@ REWRITTEN = 0.5
 SWITCHED_ON = 4.5
 """Intervals between two set-points that it takes to switch the coil on as samples are
 taken already (measured: 4.5 of a Kepco)."""
+BLIND = 0.03
+"""Time from one record to the next of a scope with gaps, s (measured: 0.02 to 0.04)."""
 NARROW = 8
 """Bits of a converter up to which a code is stored in one byte, else in two."""
 
@@ -95,11 +99,10 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
         interval = coil_capability(coil).update_interval
     limits = CoilLimits() if coil is None else coil.limits
     left, heat, _ = heat_along(current, limits)
-    before = drive.rests + (0.0 if interval is None else SWITCHED_ON * interval)
-    streamed = drive.streamed + before
-    samples = round(streamed * scene.record.sample_rate)
-    if not needed.channels:
-        samples = 0
+    first = BASELINE + (0.0 if interval is None else SWITCHED_ON * interval)
+    rests = [first] + [BASELINE] * (round(drive.rests / BASELINE) - 1)
+    trials = [s.trial.length for s in drive.steps if not s.trial.pause]
+    streamed, samples = _sampled(scene, needed, np.array(rests + trials))
     stored = samples * len(needed.stored)
     each = {c.signal: packed(scene, c) for c in needed.channels}
     each = {name: each[name] for name in needed.stored}
@@ -108,7 +111,7 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
     most = REPORT[1] + PYRAMID * stored + breaks * again
     step = 0.0 if interval is None else largest_step(current, interval)
     return Cost(
-        duration=drive.duration + before,
+        duration=drive.duration - drive.streamed + streamed,
         streamed=streamed,
         trials=len(drive.steps),
         samples_per_channel=samples,
@@ -136,6 +139,24 @@ def _stops_stream(step: Step) -> bool:
 def resolution(scene: Scene, channel: Channel) -> float:
     """One code of the scope's converter on that channel, in the signal's unit."""
     return channel.range / _scope(scene).codes * abs(channel.scale)
+
+
+def _sampled(scene: Scene, needed: Needs, stretches: FloatArray) -> tuple[float, int]:
+    """Time that samples are taken for stretches of a run, s, and those of a channel.
+
+    Where a scope takes records with gaps between them, each stretch lasts until the
+    record is there that has its end.
+    """
+    rate, number = scene.record.sample_rate, len(needed.channels)
+    time = float(stretches.sum())
+    if not number:
+        return time, 0
+    record = _scope(scene).record
+    if record is None:
+        return time, round(time * rate)
+    lasts, samples = record(1 / rate, number)
+    records = int(np.ceil(stretches / (lasts + BLIND)).sum())
+    return records * (lasts + BLIND), records * samples
 
 
 def packed(scene: Scene, channel: Channel) -> float:

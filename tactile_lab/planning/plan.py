@@ -85,7 +85,7 @@ class Plan:
             self.needs,
             self.timeline,
             0 if misses_spikes(self.scene, self.needs) else spikes,
-            self.estimate.update_interval,
+            self.estimate,
         )
 
     @cached_property
@@ -285,9 +285,10 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
         paused += f", {_time(loading)} to load waveforms"
     yield "duration", f"{_time(cost.duration)}, {count(cost.trials, 'trial')}{paused}"
     channels = len(plan.needs.channels)
+    about = "" if plan.needs.gapless else "about "
     yield (
         "samples",
-        f"{cost.samples_per_channel:,} on {count(channels, 'channel')} at "
+        f"{about}{cost.samples_per_channel:,} on {count(channels, 'channel')} at "
         f"{show(plan.scene.record.sample_rate, 'S/s')}; {cost.samples_stored:,} stored",
     )
     least, most = (bytes_text(float(f"{n:.2g}")) for n in cost.disk_beside)

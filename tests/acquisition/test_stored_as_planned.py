@@ -25,6 +25,25 @@ def test_bytes_of_samples_are_those_that_a_run_then_stores(noise, run_scene, sho
     assert 1 / 1.5 < told.disk / packed < 1.5
 
 
+@pytest.mark.parametrize("rate", ["5.1 kS/s", "20 MS/s"])
+def test_samples_of_a_scope_with_gaps_are_those_of_its_records(
+    rate, run_scene, tmp_path
+):
+    """It samples in steps of 1, 2, 5, is blind for longer than a short record lasts,
+    and what is over within a long one ends with it."""
+    (tmp_path / "gaps.toml").write_text(WITH_GAPS, encoding="utf-8")
+    keys = (
+        'record.signals=["V_C1", "coil_current"]',
+        f"bench.file={tmp_path / 'gaps.toml'}",
+        "protocol.duration=10 s",
+        f"record.sample_rate={rate}",
+    )
+    told = plan(load("monitor", keys), preview=False).estimate
+    run = run_scene(*keys, scene="monitor").stored()
+    assert 1 / 1.5 < told.samples_per_channel / run.samples < 1.5
+    assert told.duration == pytest.approx(run.duration, rel=0.1)
+
+
 def test_one_code_is_that_of_the_scope_that_the_bench_has(run_scene, tmp_path):
     """A screen's edge is 100 codes from its middle, a PicoScope's range 127."""
     (tmp_path / "gaps.toml").write_text(WITH_GAPS, encoding="utf-8")
