@@ -68,7 +68,7 @@ def command(
 
         asked = load_study(study)
         if only_plan:
-            with working("trying three points"):
+            with working("trying some points"):
                 cost = forecast(asked, out)
             if as_json:
                 print_json(_planned(asked, cost))

@@ -33,8 +33,8 @@ LONG = 1.0
 """Seconds a batch should take: little to lose, enough to be worth sending."""
 MOST = 100_000
 """Points of one batch."""
-FIRST = 3
-"""Points whose time tells what the others will take."""
+ENOUGH = 0.3
+"""Seconds of points, solved at once, whose time tells what the others will take."""
 SHELF = "points"
 """Folder of finished points, shared by all studies beside it."""
 PATIENCE = 2.0
@@ -66,8 +66,8 @@ class Forecast:
     Attributes:
         points: in all.
         there: computed before.
-        seconds: a point takes one worker, s; None where nothing is left to compute, or
-            all that were tried failed.
+        seconds: a point takes one worker, s, on average over those that were tried;
+            None where nothing is left to compute, or all of them failed.
         reason: why a tried point failed, if one did.
     """
 
@@ -86,7 +86,7 @@ def study_points(
 
 
 def forecast(study: Study, out: Path) -> Forecast:
-    """What carrying a study out under `out` will cost; tries up to three points.
+    """What carrying a study out under `out` will cost; tries some of its points.
 
     On real instruments nothing is tried: the plan of a run tells its time.
     """
@@ -97,16 +97,28 @@ def forecast(study: Study, out: Path) -> Forecast:
     if missing.size and study.on == "bench":
         seconds = plan(study.scene, preview=False).estimate.duration
     elif missing.size:
-        tried = []
-        for number in missing[:FIRST]:
-            began = time.perf_counter()
-            batch = points.batch(_task(study, named, np.array([number])))
-            took, failed = time.perf_counter() - began, batch.reasons.get(0, "")
-            reason = reason or failed
-            if not failed:  # what is refused takes no time
-                tried.append(took)
-        seconds = min(tried, default=None)  # the first one compiles
+        seconds, reason = _tried(study, points, named, missing)
     return Forecast(size, size - missing.size, seconds, reason)
+
+
+def _tried(
+    study: Study, points: Points, named: NDArray[np.void], missing: NDArray[np.intp]
+) -> tuple[float | None, str]:
+    """Seconds a point takes, of some that lie evenly among the missing, and a failure.
+
+    The first one compiles. Then come twice as many each time, at once as the study has
+    them, until they take long enough.
+    """
+    number, reason = 1, ""
+    while True:
+        even = ((np.arange(number) + 0.5) / number * missing.size).astype(np.intp)
+        began = time.perf_counter()
+        batch = points.batch(_task(study, named, missing[even]))
+        took = time.perf_counter() - began
+        reason = reason or next(iter(batch.reasons.values()), "")
+        if number == missing.size or (number > 1 and took >= ENOUGH):
+            return (took / number if len(batch.reasons) < number else None), reason
+        number = min(2 * number, missing.size)
 
 
 def carry_out(

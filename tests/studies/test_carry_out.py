@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import time
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ from tactile_lab.studies.carry_out import StudyProgress, carry_out, forecast
 from tactile_lab.studies.figures import plots
 from tactile_lab.studies.live import look_at
 from tactile_lab.studies.page import write_page
+from tactile_lab.studies.points import Points, PointTask
+from tactile_lab.studies.shelf import Batch
 from tactile_lab.studies.study import load_study
 
 
@@ -299,6 +302,24 @@ def test_the_forecast_opens_nothing_and_keeps_nothing(tmp_path: Path) -> None:
     cost = forecast(load_study({**LEVELS, "keep": {"a": "1 / 0"}}), tmp_path)
     assert cost.seconds is None, "the time of what fails tells nothing"
     assert "ZeroDivisionError" in cost.reason
+
+
+def test_the_forecast_is_of_all_points_and_not_of_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Points are solved many at once, and those with more spikes take longer."""
+    axis = {"key": "protocol.hold", "values": "100 ms : 4 s : 10 ms"}
+    asked, clock = load_study({**SHORT, "axis": [axis]}), [0.0]
+
+    def batch(points: Points, task: PointTask) -> Batch:
+        held = np.asarray(task.columns[0], dtype=float)
+        clock[0] += 1e-3 + 1e-3 * float(held.sum())
+        return Batch(task.addresses, {}, {})
+
+    monkeypatch.setattr(Points, "batch", batch)
+    monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
+    seconds = forecast(asked, tmp_path).seconds
+    assert seconds == pytest.approx(2.05e-3, rel=0.1)
 
 
 def test_a_script_gets_one_labelled_data_set(tmp_path: Path) -> None:
