@@ -223,5 +223,5 @@ def _check_threshold(scene: Scene, channel: Channel) -> None:
         raise SceneError(
             f"[detect] threshold {threshold:g} V less hysteresis "
             f"{hysteresis:g} V lies outside what the V_K channel sees, "
-            f"{bottom:g} V to {top:g} V."
+            f"{bottom:g} V to {top:g} V. Lower it, or take a larger range."
         )

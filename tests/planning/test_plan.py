@@ -286,7 +286,9 @@ def test_without_v_k_spikes_are_found_as_resets(tmp_path):
 
 
 def test_a_threshold_outside_the_channel_is_refused():
-    with pytest.raises(SceneError, match="threshold"):
+    with pytest.raises(
+        SceneError, match=r"threshold 6 V .* Lower it, or take a larger"
+    ):
         plan(load(None, ["detect.threshold=6 V"]))
 
 
