@@ -118,6 +118,7 @@ class Outcome:
         drift: change of the rest V_C1 since the first trial that looked at it, V, less
             what the film still remembers of the forces; None where V_C1 is not
             measured. It is stored with the trial, as is the rest V_C1 itself.
+        cut_off: measured signals that left their channel's range.
     """
 
     trial: Trial
@@ -131,6 +132,7 @@ class Outcome:
     source_late: bool = False
     codes: dict[str, float] = field(default_factory=dict)
     drift: float | None = None
+    cut_off: frozenset[str] = frozenset()
 
 
 Trials = Generator[Trial, Outcome, None]

@@ -93,6 +93,11 @@ class Intake:
         """What the samples' clock shows at run time `time` s, about now, s."""
         return time - self.late
 
+    def cut_off(self, since: float) -> frozenset[str]:
+        """Signals that left their channel's range after `since` s of run time."""
+        left = (name for name, until in self.overrange.items() if until > since)
+        return frozenset(left)
+
     def lacks(self, time: float) -> float:
         """How much is still to come of the samples up to run time `time` s, s."""
         return self.sampled(time) - self.reached

@@ -54,7 +54,9 @@ class ModelComparison:
             told = []
             if self._searched:
                 told.append(self._spikes(outcome, out.spike_times))
-            if inside.any():
+            if "V_C1" in outcome.cut_off:
+                told.append("V_C1 left its range")
+            elif inside.any():
                 predicted = out.sample("V_C1", time[inside])
                 off = trace[inside, 1] - predicted
                 rms = show(float(np.sqrt(np.mean(off**2))), "V", 2)

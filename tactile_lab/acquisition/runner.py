@@ -179,9 +179,7 @@ class Runner:
         self._hold(trial.voltages)
         since = self.intake.reached - BASELINE
         rest = self._live.levels(since, self.intake.reached)
-        cut_off = {
-            name for name, until in self.intake.overrange.items() if until > since
-        }
+        cut_off = self.intake.cut_off(since)
         drift = self._drifted(rest, cut_off="V_C1" in cut_off)
         rest.update(dict.fromkeys(cut_off, math.nan))
         drive = self._prepared(trial)
@@ -230,6 +228,7 @@ class Runner:
             source_late=coil is not None and coil.source_late,
             codes=self._codes(),
             drift=drift,
+            cut_off=self.intake.cut_off(shown),
         )
 
     def _compare(

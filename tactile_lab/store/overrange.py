@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
-from tactile_lab.quantity import show
+from tactile_lab.quantity import count, show
 from tactile_lab.store.stored_run import StoredRun
 
 NEAR_END = 0.98
@@ -55,7 +55,7 @@ def _sentence(run: StoredRun, name: str, found: FloatArray) -> str:
     low, high = signal.span
     times = f"at {found[0, 0]:.4g} to {found[0, 1]:.4g} s"
     if len(found) > 1:
-        times += f" and {len(found) - 1} more times until {found[-1, 1]:.4g} s"
+        times += f" and {count(len(found) - 1, 'more time')} until {found[-1, 1]:.4g} s"
     spent = float(np.sum(found[:, 1] - found[:, 0]))
     detection = run.detection
     searched = detection is not None and detection.signal == name

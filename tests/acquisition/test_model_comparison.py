@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -65,6 +66,14 @@ def test_a_sensor_that_differs_shows_at_once():
     spikes, model = map(int, re.search(r"(\d+) spikes \(model (\d+)\)", told).groups())
     assert spikes > model
     assert "V_C1 −" in told
+
+
+def test_a_voltage_that_was_cut_off_is_compared_with_nothing():
+    """V_C1 −850 mV was told of a channel at the end of its range."""
+    beside = ModelComparison(SCENE, searched=True)
+    follow(beside)
+    told = beside.ended(replace(outcome(Circuit()), cut_off=frozenset({"V_C1"})))
+    assert "spikes (model" in told and told.endswith(", V_C1 left its range")
 
 
 def test_pauses_are_followed_in_silence():

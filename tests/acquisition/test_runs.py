@@ -269,6 +269,8 @@ def test_a_rest_that_was_cut_off_at_the_range_is_no_number(run_scene, short):
     assert (first.rest, first.drift) == (None, None)
     assert [t.rest for t in later] == [pytest.approx(4.35, abs=0.05)] * 2
     assert later[0].drift == 0.0  # the first that is known is compared with
+    ended = [e.outcome for e in ran.told if isinstance(e, events.TrialEnded)]
+    assert ["V_C1" in one.cut_off for one in ended] == [True, False, False]
 
 
 def test_recovery_is_neither_streamed_nor_stored_nor_a_gap(run_scene, tmp_path):
