@@ -154,8 +154,8 @@ def fit_rate_law(
     end = np.concatenate([train[1:] for train in fired] or [np.empty(0)])
     if len(fired) < 2 or start.size < 4:
         raise NotIdentifiableError(
-            f"{count(start.size, 'interval')} in {count(len(fired), 'hold')} once node "
-            "A had followed the force, 4 in 2 are needed for a slope"
+            f"{count(start.size, 'interval')} in {count(len(fired), 'held force')} "
+            "once node A had followed, 4 in 2 are needed for a slope"
         )
 
     def fitted(

@@ -126,4 +126,4 @@ def test_too_few_intervals_for_a_slope_are_those_that_count():
         for text in find(modelled("rate_force", [pulse(0.12)])).missing
         if text.startswith("No slope")
     )
-    assert re.search(r"\d+ intervals? in 1 hold once node A had followed", why)
+    assert re.search(r"\d+ intervals? in 1 held force once node A had followed", why)
