@@ -154,6 +154,10 @@ Of each row that names two commits, the first 30 seeds were run again at the lat
 (`docs/make_bench_coverage.py --again`, from what `docs/bench-coverage.csv` keeps). They
 told the same numbers and intervals, within 0.2 % of a half-width.
 
+`identify` fits what a converter's steps leave of V_C1's means since ab8a537e; its rows
+of earlier commits are of before, when of 30 runs of `rate_force` with the shunt V_GS
+held in 8, tau in 16 and I_bias in 8.
+
 "One number repeated" is no evidence of coverage, however many runs gave it. Offset and
 gain of `wiring_check` are such: the probes on 0 V and V_S pass by all that is drawn,
 the stored samples carry no noise there, and 0 V lies on the edge of a code. So all runs
