@@ -141,12 +141,14 @@ def _prefix(given: str, wanted: str) -> float | None:
 _SHOWN = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
-def show(value: float, unit: str, digits: int = 4) -> str:
+def show(
+    value: float, unit: str, digits: int = 4, sign: Literal["-", "+"] = "-"
+) -> str:
     """`value` (SI) for a person: "50 mN", with a prefix that keeps 1 to 999 in front.
 
     Areas are in m^2 or mm^2; other powers, compound units and numbers without a unit
-    get no prefix. A true minus is used. Below 1e-18 it is a rounding error, and 0 for a
-    person.
+    get no prefix. A true minus is used, with `sign` "+" a plus where it is positive,
+    too. Below 1e-18 it is a rounding error, and 0 for a person.
     """
     if not math.isfinite(value):
         return f"{value} {unit}"
@@ -164,7 +166,8 @@ def show(value: float, unit: str, digits: int = 4) -> str:
     text = f"{number:.{digits}g}"
     if "e+" in text and abs(number) < (1e4 if unit else 1e9):
         text = f"{float(text):.0f}"
-    return printed(f"{text} {prefix}{unit}").rstrip()
+    plus = "+" if sign == "+" and value > 0 else ""
+    return plus + printed(f"{text} {prefix}{unit}").rstrip()
 
 
 def plus_minus(value: float, half: float, unit: str = "", digits: int = 2) -> str:

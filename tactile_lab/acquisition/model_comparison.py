@@ -60,7 +60,7 @@ class ModelComparison:
                 predicted = out.sample("V_C1", time[inside])
                 off = trace[inside, 1] - predicted
                 rms = show(float(np.sqrt(np.mean(off**2))), "V", 2)
-                told.append(f"V_C1 {_signed(float(off.mean()), 'V')} ({rms} rms)")
+                told.append(f"V_C1 {show(float(off.mean()), 'V', 2, '+')} ({rms} rms)")
         except TactileLabError as reason:
             self._model = None
             return f"the model cannot follow any more: {reason}"
@@ -75,13 +75,9 @@ class ModelComparison:
         text = f"{count} spike{'' if count == 1 else 's'} (model {mine.size})"
         offsets = match(outcome.spike_times, mine).offsets
         if offsets.size:
-            text += f", {_signed(float(np.median(offsets)), 's')} (median"
+            text += f", {show(float(np.median(offsets)), 's', 2, '+')} (median"
             if self._doubt > 0:
                 known = show(self._doubt, "s", 2)
                 text += f"; the coil's steps are known to ±{known}"
             text += ")"
         return text
-
-
-def _signed(value: float, unit: str) -> str:
-    return f"{'+' if value > 0 else ''}{show(value, unit, 2)}"

@@ -67,8 +67,7 @@ def conclude(found: Gathered) -> Conclusion:
 def _told(found: Gathered, name: str, value: float, *, signed: bool = False) -> str:
     if not math.isfinite(value):
         return "none"
-    text = show(float(value), found.unit(name))
-    return f"+{text}" if signed and value > 0 else text
+    return show(float(value), found.unit(name), sign="+" if signed else "-")
 
 
 def _every(found: Gathered) -> Iterator[Table]:
