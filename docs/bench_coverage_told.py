@@ -66,8 +66,8 @@ def bipolar(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     made = simulate(true.circuit, true.force, keep=("V_P",), until=run.duration)
     for change in values.get("I_DS_changes", ()):
         trial = next(t for t in run.results if t.label == change["label"])
-        arrived = run.applied_edge(trial)
-        assert arrived is not None
+        assert trial.held is not None
+        arrived, _ = trial.held
         later = 0.1  # the force is wholly there; V_P is followed back to `arrived`
         V_P = made.sample("V_P", np.array([trial.start - 0.1, arrived + later]))
         V_P[1] *= np.exp(later / true.circuit.tau)

@@ -208,9 +208,7 @@ def _changes(
     begins = np.array(
         [run.mean("I_DS", t.start - BEFORE, t.start + MARGIN) for t in held]
     )
-    holds = [
-        (run.applied_edge(t) or t.start, t.held[1]) for t in held if t.held is not None
-    ]
+    holds = [t.held for t in held if t.held is not None]
     averaged = 2 * float(np.median(np.diff(trace.time)))
 
     def fitted(offset: float, at_rest: float) -> tuple[Decay, np.ndarray[Any, Any]]:

@@ -100,9 +100,8 @@ def _slope(run: Measurement) -> Conclusion:
         return Conclusion((), {"slopes": None}, (why,))
     trains = []
     for t in rated:
-        arrived, end = run.applied_edge(t), t.held[1] if t.held else 0.0
-        spikes = t.spike_times + t.start
-        trains.append(within(spikes, ((arrived or t.start) + FOLLOWED, end)))
+        begin, end = t.held or (0.0, 0.0)
+        trains.append(within(t.spike_times + t.start, (begin + FOLLOWED, end)))
     believed = simulate(run.circuit, run.force, keep=("V_P",), until=run.duration)
     try:
         law = fit_rate_law(

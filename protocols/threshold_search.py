@@ -287,9 +287,8 @@ def _scatter_of_V_fire(run: Measurement) -> float | None:
     circuit, spikes = run.circuit, run.spike_times
     held = np.zeros(spikes.size, dtype=np.bool_)
     for trial in run.results:
-        begin = run.applied_edge(trial)
-        if trial.hold is not None and begin is not None and not trial.uncounted:
-            end = trial.start + trial.hold[1]
+        if trial.held is not None and not trial.uncounted:
+            begin, end = trial.held
             held |= (spikes >= begin + FOLLOWED) & (spikes <= end)
     freedom = int(np.count_nonzero(np.diff(spikes[held]) <= LONGEST)) - 1
     if circuit is None or circuit.saturation or freedom < 1:

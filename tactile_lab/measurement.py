@@ -103,7 +103,9 @@ class MeasuredTrial:
         spike_times: shape (k,), s from the trial's start.
         onset: when the force begins to change, s from the trial's start; None where it
             never does.
-        hold: (start, end) of the constant part, s from the trial's start, or None.
+        hold: (start, end) of the constant part, s from the trial's start, or None: from
+            when the force applied was there to when it began to leave, no earlier than
+            asked.
         pause: a planned recovery; listed nowhere but in the time axis.
         rest: V_C1 just before the trial, V, or None.
         drift: change of that since the first trial, V, less what the film still
@@ -276,7 +278,7 @@ class Measurement:
     ) -> tuple[CircuitAdaptation | None, str]:
         """The circuit's own law fitted to a trial's hold, or None and why not.
 
-        The hold counts from when the applied force was there and node A had followed.
+        The hold counts from when node A had followed the force applied.
         """
         if trial.start not in self._circuit_fits:
             self._circuit_fits[trial.start] = self._fit_circuit(trial)
@@ -293,15 +295,14 @@ class Measurement:
             return None, trial.uncounted
         if trial.hold is not None and trial.level is None:
             return None, NOT_HELD
-        begin = self.applied_edge(trial)
-        if self.circuit is None or trial.hold is None or begin is None:
+        if self.circuit is None or trial.hold is None:
             return None, "no hold, or no circuit to compare with"
         from tactile_lab.analysis.circuit_adaptation import (
             FOLLOWED,
             fit_circuit_adaptation,
         )
 
-        hold = begin + FOLLOWED - trial.start, trial.hold[1]
+        hold = trial.hold[0] + FOLLOWED, trial.hold[1]
         try:
             found = fit_circuit_adaptation(
                 self.circuit, trial.spike_times, hold, self.displaced.values()
@@ -376,19 +377,6 @@ class Measurement:
             return 0.0
         inside = (trace.time >= start) & (trace.time <= end)
         return step_bias(trace.mean[inside], trace.code, trace.samples)
-
-    def applied_edge(self, trial: MeasuredTrial) -> float | None:
-        """When the force came within 1 % of that of the hold, s of run time, or None.
-
-        A coil that is set over a serial line gets there after the hold's nominal start.
-        Where the trial has no level its hold is not constant, and begins as planned.
-        """
-        if trial.held is None:
-            return None
-        start, end = trial.held
-        if trial.level is None:
-            return start
-        return max(start, self.force.arrival((start + end) / 2, trial.start))
 
     def field_between(self, start: float, end: float) -> FloatArray:
         """Field read in [start, end] s of run time, T; empty where none was."""

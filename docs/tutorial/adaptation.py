@@ -27,7 +27,7 @@ print(run)
 # 2. Trials and spikes are arrays; times are in s, the trial's own begin at its start.
 (trial,) = run.trials
 spikes = run.spikes["time"] - trial["start"]
-hold = trial["hold_start"], trial["hold_end"]
+hold = run.holds[0]  # when the force stood: a coil comes to it later than asked
 answer = respond(spikes, hold=hold)
 print(f"first spike {answer.latency:.3f} s after the onset of the force")
 print(f"highest rate {answer.peak_rate:.1f} Hz, final rate {answer.final_rate:.1f} Hz")

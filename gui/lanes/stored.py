@@ -17,8 +17,8 @@ from tactile_lab.engine.events import ModelPart
 from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.pyramid import FINE, Pyramid
 from tactile_lab.signals import AVERAGED, BENCH_ONLY
+from tactile_lab.store.applied_trial import holds, onsets
 from tactile_lab.store.layout import BIN
-from tactile_lab.store.onset import onsets
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
 from tactile_lab.store.signal import StoredSignal
@@ -65,7 +65,10 @@ class RunSource(Source):
         self.spikes = run.spikes["time"].copy()
         self.read_notes()
         self.trials = run.trials
-        self.holds = [_hold(trial) for trial in self.trials]
+        self.holds = [
+            _stretch(*one)
+            for one in zip(self.trials, holds(run, self.trials), strict=True)
+        ]
         self.onsets = _onsets(run, self.trials)
         self.uncounted = uncounted(run)
         self.counted = samples_catch_spikes(run)
@@ -261,11 +264,10 @@ def _slow(run: Run, gain: float) -> dict[str, tuple[FloatArray, FloatArray]]:
     }
 
 
-def _hold(trial: Any) -> Stretch:
+def _stretch(trial: Any, hold: tuple[float, float] | None) -> Stretch:
     start, end = float(trial["start"]), float(trial["end"])
     label = bytes(trial["label"]).decode("utf-8", "replace").rstrip("\0")
-    begin, stop = float(trial["hold_start"]), float(trial["hold_end"])
-    held = None if begin != begin else (start + begin, start + stop)
+    held = hold and (start + hold[0], start + hold[1])
     return Stretch(start, end, label, bool(trial["pause"]), held)
 
 

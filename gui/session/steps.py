@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from gui.plots.numbers import number
 from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.quantity import show
-from tactile_lab.store.onset import begun
+from tactile_lab.store.applied_trial import begun, stood
 from tactile_lab.trial import Outcome
 from tactile_lab.waveform import Waveform
 
@@ -47,7 +47,7 @@ def of_outcome(outcome: Outcome, uncounted: str = "") -> MeasuredTrial | None:
         duration=trial.length,
         spike_times=outcome.spike_times,
         onset=_begun(outcome),
-        hold=trial.hold,
+        hold=_stood(outcome),
         uncounted=uncounted,
         skipped=outcome.skipped,
     )
@@ -61,6 +61,14 @@ def _begun(outcome: Outcome) -> float | None:
     return begun(asked, Waveform.stairs(outcome.current, length), 0.0, length)
 
 
+def _stood(outcome: Outcome) -> tuple[float, float] | None:
+    """When its current stood, (start, end) s from its start; None without a hold."""
+    asked, length = outcome.trial.hold, outcome.trial.length
+    if asked is None or not outcome.trial.level or not len(outcome.current):
+        return asked
+    return stood(asked, Waveform.stairs(outcome.current, length), 0.0, length)
+
+
 def of_run(source: RunSource) -> list[MeasuredTrial]:
     """What each step of a run on disk gave."""
     found = []
@@ -72,7 +80,7 @@ def of_run(source: RunSource) -> list[MeasuredTrial]:
             continue
         inside = (source.spikes >= hold.start) & (source.spikes < hold.end)
         level = float(row["level"])
-        span = (float(row["hold_start"]), float(row["hold_end"]))
+        held = hold.held and (hold.held[0] - hold.start, hold.held[1] - hold.start)
         found.append(
             MeasuredTrial(
                 label=hold.label,
@@ -81,7 +89,7 @@ def of_run(source: RunSource) -> list[MeasuredTrial]:
                 duration=hold.end - hold.start,
                 spike_times=source.spikes[inside] - hold.start,
                 onset=onset,
-                hold=span if span[0] == span[0] else None,
+                hold=held,
                 complete=bool(row["complete"]),
                 uncounted=uncounted,
                 skipped=int(row["skipped"]),

@@ -28,7 +28,7 @@ from tactile_lab.report.mains import told as mains_told
 from tactile_lab.report.run_data import Loss, RunData
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import CELSIUS, ZERO_CELSIUS
-from tactile_lab.store.onset import onsets
+from tactile_lab.store.applied_trial import holds, onsets
 from tactile_lab.store.overrange import told as overrange_told
 from tactile_lab.store.progress import Progress, each, nothing
 from tactile_lab.store.remarks import read_remarks
@@ -193,11 +193,17 @@ def _trials(run: Run) -> tuple[MeasuredTrial, ...]:
             complete,
             spikes,
             onset,
+            hold,
             _clock(run, scene, float(row["start"]), float(row["end"])),
             why_not,
         )
-        for row, complete, onset, why_not in zip(
-            rows, ended(rows).tolist(), onsets(run, rows), uncounted(run), strict=True
+        for row, complete, onset, hold, why_not in zip(
+            rows,
+            ended(rows).tolist(),
+            onsets(run, rows),
+            holds(run, rows),
+            uncounted(run),
+            strict=True,
         )
     ]
     end = max((t.start + t.duration for t in trials), default=0.0)
@@ -238,11 +244,11 @@ def _trial(
     complete: bool,
     spikes: FloatArray,
     onset: float | None,
+    hold: tuple[float, float] | None,
     clock: float | None,
     why_not: str,
 ) -> MeasuredTrial:
     start, end, level = (float(row[name]) for name in ("start", "end", "level"))
-    held = (float(row["hold_start"]), float(row["hold_end"]))
     return MeasuredTrial(
         label=bytes(row["label"]).decode("utf-8", errors="replace"),
         level=None if np.isnan(level) else level,
@@ -250,7 +256,7 @@ def _trial(
         duration=end - start,
         spike_times=spikes[(spikes >= start) & (spikes < end)] - start,
         onset=onset,
-        hold=None if np.isnan(held[0]) else held,
+        hold=hold,
         pause=bool(row["pause"]),
         complete=complete,
         rest=_number(row, "rest_V_C1"),

@@ -70,10 +70,7 @@ def _holds(run: Measurement, axis: ClosedTime) -> list[Guide]:
     found = []
     for trial in run.trials:
         if trial.held is not None and not trial.pause:
-            start, end = trial.held
-            late = max((run.applied_edge(trial) or start) - start, 0.0)
-            late = late if late < (end - start) / 2 else 0.0
-            begin, over = axis.at(start + late), axis.at(end + late)
+            begin, over = axis.at(trial.held[0]), axis.at(trial.held[1])
             found.append(Guide(at=begin, to=over, colour="band"))
     return found
 

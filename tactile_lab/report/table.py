@@ -34,8 +34,9 @@ def trials_table(run: Measurement) -> Table:
             note="V_K was not searched for spikes.",
         )
     note = (
-        "In ramps: spikes outside the hold, part of the whole. First spike: time from "
-        "the onset of the force, ± how well the clocks of coil and scope are aligned. "
+        "In ramps: spikes outside the hold as applied, part of the whole. First spike: "
+        "time from the onset of the force, ± how well the clocks of coil and scope are "
+        "aligned. "
         "Peak and final rate: highest, and of the last two spikes, within the hold. "
         "Fall: from the highest rate within the hold to the final one. Time constant: "
         "1/|β| with its 95 % interval."

@@ -15,6 +15,7 @@ from tactile_lab.errors import NotIdentifiableError, RunFolderError
 from tactile_lab.model.drain_current import DrainCurrent
 from tactile_lab.quantity import show
 from tactile_lab.signals import SIGNALS
+from tactile_lab.store.applied_trial import holds
 from tactile_lab.store.derived import derivable, drain_current_of
 from tactile_lab.store.layout import RECORDS
 from tactile_lab.store.selection import Selection
@@ -45,6 +46,15 @@ class Run(StoredRun):
         """
         return drain_current_of(self)
 
+    @property
+    def holds(self) -> list[tuple[float, float] | None]:
+        """When the force of each trial stood, (start, end) s from its start, or None.
+
+        As applied: a coil that is set over a serial line comes there later than
+        `trials` has it, which says what was asked.
+        """
+        return holds(self, self.trials)
+
     def adaptation(self, trial: int = 0) -> CircuitAdaptation:
         """The circuit's own law fitted to the spikes in a trial's hold, Eqs. (7), (15).
 
@@ -60,18 +70,17 @@ class Run(StoredRun):
             fit_circuit_adaptation,
         )
 
-        row = self.trials[trial]
-        start, end = (float(row["start"] + row[n]) for n in ("hold_start", "hold_end"))
-        if not start < end:
+        held = self.holds[trial]
+        if held is None:
             raise NotIdentifiableError("the trial has no hold")
         growing = self.status == "running"
         if why := (uncounted(self) if growing else self._uncounted)[trial]:
             raise NotIdentifiableError(why)
-        arrived = self.force.arrival((start + end) / 2, float(row["start"]))
+        start = float(self.trials[trial]["start"])
         return fit_circuit_adaptation(
             self.scene.circuit,
             self.spikes["time"],
-            (max(start, arrived) + FOLLOWED, end),
+            (start + held[0] + FOLLOWED, start + held[1]),
             self.scene.displaced.values(),
         )
 

@@ -26,7 +26,8 @@ def pushed_and_pulled(seed, *, late=0.06, code=CODE, noise=5e-3, levels=(0.08, -
         steps.append((f"{level * 1e3:g} mN", level, wave, False))
     quiet = ("rest", None, Waveform.through([(0.0, 0.0), (0.5, 0.0)]), False)
     run = modelled("bipolar", [quiet, *steps], searched=False, bins=2000)
-    held = tuple(replace(t, hold=t.level and (0.25, 5.25)) for t in run.trials)
+    stood = 0.25 + late, 5.25 + late
+    held = tuple(replace(t, hold=t.level and stood) for t in run.trials)
     V_C1, rng = run.traces[0], np.random.default_rng(seed)
     noisy = V_C1.mean[:, None] + rng.normal(0, noise, (2000, 100))
     shown = 2.5 + code * np.rint((noisy - 2.5) / code).mean(axis=1)
@@ -83,7 +84,7 @@ def _changed_by_eq_8(run, level):
     """From before the push to when the force is there, node A having followed."""
     trial = next(t for t in run.trials if t.level == level)
     made = simulate(Circuit(), run.force, keep=("V_P",))
-    ends = np.array([trial.start, run.applied_edge(trial)])
+    ends = np.array([trial.start, trial.held[0]])
     before, after = np.exp(made.sample("V_P", ends) / (5.646 * 0.025))
     return 24.69e-9 * (after - before)
 

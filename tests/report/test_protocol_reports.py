@@ -263,9 +263,7 @@ def test_a_sine_is_looked_at_with_its_frequency_and_not_with_its_label():
     late = math.atan(turn * resistance * circuit.C1)
     assert found["frequency_Hz"] == pytest.approx(frequency)
     assert found["phase_rad"]["value"] == pytest.approx(leak - late - np.pi, abs=5e-3)
-    assert run.applied_edge(run.trials[0]) == 0.0, (
-        "a sine is at no level that it comes to"
-    )
+    assert run.trials[0].hold[0] == 0.0, "a sine is at no level that it comes to"
 
 
 def test_what_a_report_says_of_adaptation_finds_its_run(tmp_path):

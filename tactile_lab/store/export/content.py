@@ -110,15 +110,16 @@ def dated_current(run: Run) -> NDArray[Any]:
 
 
 def _trials(run: Run) -> ExportTable:
-    rows = run.trials
+    rows, held = run.trials, run.holds
+    stood = np.array([hold or (np.nan, np.nan) for hold in held]).reshape(-1, 2)
     columns = {
         "index": rows["index"],
         "label": _plain(rows["label"]),
         "level": rows["level"],
         "start": rows["start"],
         "end": rows["end"],
-        "hold_start": rows["start"] + rows["hold_start"],
-        "hold_end": rows["start"] + rows["hold_end"],
+        "hold_start": rows["start"] + stood[:, 0],
+        "hold_end": rows["start"] + stood[:, 1],
         "spikes": rows["spikes"],
         "pause": rows["pause"],
         "complete": ended(rows).astype(np.uint8),

@@ -1,0 +1,101 @@
+"""When the force of each trial begins to change, and when it stands.
+
+A latency counts from the one, peak and final rate within the other. A coil that is set
+over a serial line comes to both later than asked.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from tactile_lab.errors import SceneError
+from tactile_lab.scene.scene import Scene
+from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.waveform import Waveform
+
+if TYPE_CHECKING:  # the window counts from here before it has loaded what reads runs
+    from tactile_lab.store.stored_run import Records, StoredRun
+
+
+def onsets(run: StoredRun, trials: Records) -> list[float | None]:
+    """Of each trial, s from its start; None where the force applied stands still.
+
+    Raises:
+        SceneError: the run's scene cannot be read any more.
+    """
+    if "onset" in (trials.dtype.names or ()):
+        asked = trials["onset"].tolist()
+    else:  # older runs lack it
+        asked = [_first_onset(run.scene)] * len(trials)
+    return [
+        None if math.isnan(at) else begun(at, run.force, float(start), float(end))
+        for at, start, end in zip(asked, trials["start"], trials["end"], strict=True)
+    ]
+
+
+def holds(run: StoredRun, trials: Records) -> list[tuple[float, float] | None]:
+    """Of each trial, (start, end) of its hold, s from its start; None without one.
+
+    As asked where the trial has no one level, and where the run's scene cannot be read
+    any more: its force is not known.
+    """
+    try:
+        force = run.force
+    except SceneError:
+        force = None
+    found: list[tuple[float, float] | None] = []
+    for row in trials:
+        asked = float(row["hold_start"]), float(row["hold_end"])
+        start, end, level = (float(row[name]) for name in ("start", "end", "level"))
+        if math.isnan(asked[0]):
+            found.append(None)
+        elif force is None or not abs(level) > 0:
+            found.append(asked)
+        else:
+            found.append(stood(asked, force, start, end))
+    return found
+
+
+def stood(
+    asked: tuple[float, float], applied: Waveform, start: float, end: float
+) -> tuple[float, float]:
+    """When `applied` stood in a trial that holds one level, s from its start.
+
+    From when it came within 1 % of what it was amid the hold, no earlier than asked, to
+    when it began to leave that, no later than the trial.
+
+    Args:
+        asked: (start, end) of the hold, s from the trial's start.
+        applied: force or current.
+        start: of the trial, s on the axis of `applied`.
+        end: of the trial, likewise.
+    """
+    middle = start + (asked[0] + asked[1]) / 2
+    came = max(start + asked[0], applied.arrival(middle, start))
+    left = applied.departure(middle, end)
+    over = start + asked[1] if left is None else max(start + asked[1], left)
+    return came - start, over - start
+
+
+def begun(asked: float, applied: Waveform, start: float, end: float) -> float | None:
+    """When `applied` began to change in a trial, s from its start; None if never.
+
+    A coil that is set over a serial line begins later than asked, and still ends the
+    trial before when this one begins: that is no change of this one's.
+
+    Args:
+        asked: when it was to begin, s from the trial's start.
+        applied: force or current.
+        start: of the trial, s on the axis of `applied`.
+        end: of the trial, likewise.
+    """
+    left = applied.departure(start + asked, end)
+    return None if left is None else left - start
+
+
+def _first_onset(scene: Scene) -> float:
+    """When the first presentation of the scene's protocol begins to change it, s."""
+    if not isinstance(scene.protocol, ForceProtocol):
+        return 0.0
+    return next(scene.protocol.presentations()).onset or 0.0
