@@ -3,6 +3,7 @@ SHELL := /bin/bash
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+PIP_STAMP := $(VENV)/.pip
 RUN_STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
 SIMULATORS_STAMP := $(VENV)/.installed-simulators
@@ -30,13 +31,14 @@ demo: $(RUN_STAMP)
 gui: $(DEV_STAMP)
 	$(BIN)/tactile-lab gui
 
-test: $(DEV_STAMP)
+test:
+	# all that tests need is fetched side by side
+	$(MAKE) --no-print-directory -j 3 $(DEV_STAMP) $(SIMULATORS_STAMP) $(SYSTEM_STAMP)
 	# what is compiled is compiled once, or each worker does it; meanwhile types are
-	# checked, and what else tests need is fetched
+	# checked
 	{ $(BIN)/python tests/support/compile_once.py >$(VENV)/compiling 2>&1 || \
 	    { cat $(VENV)/compiling; exit 1; } } & compiling=$$!; \
-	    $(MAKE) --no-print-directory $(SIMULATORS_STAMP) $(SYSTEM_STAMP) & fetching=$$!; \
-	    $(MAKE) --no-print-directory check && wait $$fetching && wait $$compiling
+	    $(MAKE) --no-print-directory check && wait $$compiling
 	$(BIN)/python -m pytest -n auto --dist loadfile
 
 check: $(DEV_STAMP)
@@ -69,18 +71,20 @@ clean:
 $(BIN)/python:
 	@.ci/venv $(PYTHON) $(VENV)
 
-$(RUN_STAMP): pyproject.toml | $(BIN)/python
+$(PIP_STAMP): | $(BIN)/python
 	$(BIN)/python -m pip install -q --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install -q -e .
 	@touch $@
 
-$(DEV_STAMP): pyproject.toml | $(BIN)/python
-	$(BIN)/python -m pip install -q --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install -q -e ".[gui]" --group dev
+# compiled as it is imported: much of what comes never is
+$(RUN_STAMP): pyproject.toml | $(PIP_STAMP)
+	$(BIN)/python -m pip install -q --no-compile -e .
+	@touch $@
+
+$(DEV_STAMP): pyproject.toml | $(PIP_STAMP)
+	$(BIN)/python -m pip install -q --no-compile -e ".[gui]" --group dev
 	@touch $@ $(RUN_STAMP)
 
-# compiled as it is imported: of SymPy and others little ever is
-$(SIMULATORS_STAMP): pyproject.toml $(DEV_STAMP)
+$(SIMULATORS_STAMP): pyproject.toml | $(PIP_STAMP)
 	$(BIN)/python -m pip install -q --no-compile --no-deps --upgrade --target $(VENV)/simulators --group simulators
 	@touch $@
 

@@ -55,36 +55,36 @@ settings.register_profile(
 settings.load_profile("settled")
 
 WAITING = {
-    "tests/drivers/test_acceptance_rehearsal.py": "wires",
-    "tests/drivers/test_guard.py": "wires",
-    "tests/drivers/test_serial_acceptance_rehearsal.py": "wires",
-    "tests/sim_backend/test_serial_servers.py": "wires",
-    "tests/commands/test_killed_run.py": "programs",
-    "tests/commands/test_killed_with_a_source_meter.py": "programs",
-    "tests/commands/test_monitor.py": "programs",
-    "tests/commands/test_run_on_served_source.py": "programs",
-    "tests/gui/test_on_screen.py": "programs",
+    "tests/gui/test_on_screen.py",
+    "tests/commands/test_killed_run.py",
+    "tests/commands/test_killed_with_a_source_meter.py",
+    "tests/commands/test_monitor.py",
+    "tests/commands/test_run_on_served_source.py",
+    "tests/drivers/test_acceptance_rehearsal.py",
+    "tests/drivers/test_guard.py",
+    "tests/drivers/test_serial_acceptance_rehearsal.py",
+    "tests/sim_backend/test_serial_servers.py",
 }
-"""Files that wait, for wires or other programs, more than they compute; for which."""
+"""Files that wait, for wires or other programs, more than they compute."""
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """A worker for each core, and one for each kind of waiting."""
-    return (os.cpu_count() or 1) + len(set(WAITING.values()))
+    """A worker for each core, and one that waits: each takes 10 s to collect."""
+    return (os.cpu_count() or 1) + 1
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(
     config: pytest.Config, log: Producer
 ) -> LoadFileScheduling | None:
-    """Give one worker each kind of waiting, first of all, and then file by file."""
+    """Give one worker all that waits, first of all, and then file by file."""
     from xdist.scheduler import LoadFileScheduling
 
     class Lanes(LoadFileScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = super()._split_scope(nodeid)
-            return WAITING.get(file, file)
+            return "waiting" if file in WAITING else file
 
     if config.getoption("dist") != "loadfile":
         return None

@@ -8,6 +8,7 @@ offset is added at the input, its input bias is part of the circuit.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -17,6 +18,8 @@ SETTLED = 14.0
 """Time constants after which what remains is below a millionth."""
 CELLS = 1 << 13
 """Values of a pulse; between them it is straight."""
+KEPT = 64
+"""Pulses, of 64 kB each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,30 +54,45 @@ class Follower:
 
     def spike(self, amplitude: float, decay: float) -> Pulse | None:
         """Output for an input that jumps to `amplitude` V and decays with `decay` s."""
-        if decay <= 0:
-            return None
-        length = SETTLED * (decay + self.pole) + abs(amplitude) / self.slew
-        step = length / CELLS
-        time = np.arange(CELLS + 1) * step
-        ideal = amplitude * np.exp(-time / decay)
-        return Pulse(step, ideal if self.pole == 0 else self._follow(ideal, step))
+        return _spike(self, amplitude, decay) if decay > 0 else None
 
     def edge(self, drop: float) -> Pulse | None:
         """Output less input after the input fell by `drop` V at once."""
-        if self.pole == 0:
-            return None
-        length = SETTLED * self.pole + drop / self.slew
-        step = length / CELLS
-        fallen = np.full(CELLS + 1, -drop)
-        return Pulse(step, self._follow(fallen, step) + drop)
+        return _edge(self, drop) if self.pole > 0 else None
 
-    def _follow(self, wanted: FloatArray, step: float) -> FloatArray:
-        """Output from 0 V: y' = (x - y)/pole, limited to +-slew."""
-        output = np.empty(wanted.size)
-        y, most = 0.0, self.slew * step
-        share = -np.expm1(-step / self.pole)
-        output[0] = y
-        for i, x in enumerate(((wanted[1:] + wanted[:-1]) / 2).tolist(), start=1):
-            y += min(max((x - y) * share, -most), most)
-            output[i] = y
-        return output
+
+# kept: a bench is opened for every run, and its pulses are those of the one before
+
+
+@lru_cache(KEPT)
+def _spike(follower: Follower, amplitude: float, decay: float) -> Pulse:
+    length = SETTLED * (decay + follower.pole) + abs(amplitude) / follower.slew
+    step = length / CELLS
+    ideal = amplitude * np.exp(-np.arange(CELLS + 1) * step / decay)
+    return _unchanged(step, _followed(follower, ideal, step))
+
+
+@lru_cache(KEPT)
+def _edge(follower: Follower, drop: float) -> Pulse:
+    step = (SETTLED * follower.pole + drop / follower.slew) / CELLS
+    fallen = np.full(CELLS + 1, -drop)
+    return _unchanged(step, _followed(follower, fallen, step) + drop)
+
+
+def _unchanged(step: float, value: FloatArray) -> Pulse:
+    value.flags.writeable = False  # all that ask for it have the same
+    return Pulse(step, value)
+
+
+def _followed(follower: Follower, wanted: FloatArray, step: float) -> FloatArray:
+    """Output from 0 V: y' = (x - y)/pole, limited to +-slew."""
+    if follower.pole == 0:
+        return wanted
+    output = np.empty(wanted.size)
+    y, most = 0.0, follower.slew * step
+    share = -np.expm1(-step / follower.pole)
+    output[0] = y
+    for i, x in enumerate(((wanted[1:] + wanted[:-1]) / 2).tolist(), start=1):
+        y += min(max((x - y) * share, -most), most)
+        output[i] = y
+    return output

@@ -7,6 +7,7 @@ import platform
 import subprocess
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -133,15 +134,23 @@ def environment() -> dict[str, str]:
     found = {
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        **_versions(),
     }
+    commit = commit_of(Path(__file__).parents[2])
+    if commit is not None:
+        found["commit"] = commit
+    return found
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Of `PACKAGES`; a process keeps those it began with."""
+    found = {}
     for name in PACKAGES:
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             found[name] = "not installed"
-    commit = commit_of(Path(__file__).parents[2])
-    if commit is not None:
-        found["commit"] = commit
     return found
 
 

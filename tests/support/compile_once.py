@@ -7,6 +7,7 @@ would rewrite the assertions of every test. This is done while another process c
 the types, and in two: those are done long before one would have compiled all.
 """
 
+import gc
 import os
 import subprocess
 import sys
@@ -57,6 +58,7 @@ def compile_all(equations: str) -> None:
     """Run one command after another in a folder then removed."""
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
+        gc.set_threshold(50_000, 20, 20)  # a compiler keeps nearly all that it makes
         Path("plain.toml").write_text(SKIN.format(saturation=""))
         Path("saturated.toml").write_text(SKIN.format(saturation="saturation = true"))
         Path("sweep.toml").write_text(STUDY)
