@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from tactile_lab.analysis.error_budget import ErrorBudget
 from tactile_lab.analysis.estimate import Estimate, student_95
 from tactile_lab.conclusion import Conclusion
-from tactile_lab.measurement import MeasuredTrial, Measurement
+from tactile_lab.measurement import SETTLING, MeasuredTrial, Measurement
 from tactile_lab.quantity import ROUNDING, Duration, Force, Pause, plus_minus, show
 from tactile_lab.stimulus.force import ForceProtocol, pause, step
 from tactile_lab.trial import Trials
@@ -77,14 +77,15 @@ class ForceCheck(ForceProtocol):
             for t, force, band in zip(trials, by_field, bands, strict=True)
             if force is not None
         ]
-        field = Conclusion(values=values)
+        missing = _unsettled(run) if run.field_between(0.0, run.duration).size else ()
+        field = Conclusion(values=values, missing=missing)
         if known:
             said = (
                 f"F(I) − F(0) by Eq. (2) from the field read, F(0) in the second "
                 f"before each trial: {', '.join(known)} (95 %: scatter of the "
                 "readings, and what the bench states of Eq. (2))."
             )
-            field = Conclusion((said,), values, budgets=_widest(budgets))
+            field = Conclusion((said,), values, missing, budgets=_widest(budgets))
             field += Conclusion(run.not_stated)
         return field + self._read_over_eq2(run)
 
@@ -139,6 +140,17 @@ class ForceCheck(ForceProtocol):
         return Conclusion((said,), found, budgets=budgets)
 
 
+def _unsettled(run: Measurement) -> tuple[str, ...]:
+    """Which forces the field tells nothing of, as it was not read once it stood."""
+    unread = [t.label for t in run.results if t.held and not run.field_held(t).size]
+    if not unread:
+        return ()
+    return (
+        f"No F(I) of {', '.join(unread)}: the field was not read once it had settled, "
+        f"{SETTLING:g} s after the current came; make protocol.hold longer.",
+    )
+
+
 def _widest(budgets: Sequence[ErrorBudget | None]) -> dict[str, ErrorBudget]:
     """That of the force by the field that is known least."""
     known = [budget for budget in budgets if budget is not None]
@@ -151,11 +163,10 @@ def _budget(
     run: Measurement, trial: MeasuredTrial, force: float | None
 ) -> ErrorBudget | None:
     """What is not known of a force by the field, N; nobody states the meter's error."""
-    if force is None or trial.held is None or run.newtons_per_tesla is None:
+    if force is None or run.newtons_per_tesla is None:
         return None
-    start, end = trial.held
     scatter = 0.0
-    for part in ((start + end) / 2, end), (trial.start - 1.0, trial.start):
+    for part in _late(run, trial), (trial.start - 1.0, trial.start):
         read = run.field_between(*part)
         # readings that are all alike tell no more than their last digit
         scatters = read.size > 1 and np.ptp(read) > 0
@@ -167,11 +178,17 @@ def _budget(
 
 def _force_by_field(run: Measurement, trial: MeasuredTrial) -> float | None:
     """F(I) - F(0) of a trial from the field in its hold and before it, N."""
-    if trial.held is None or run.newtons_per_tesla is None:
+    if run.newtons_per_tesla is None:
         return None
-    start, end = trial.held
-    held = run.field_between((start + end) / 2, end)
+    held = run.field_between(*_late(run, trial))
     before = run.field_between(trial.start - 1.0, trial.start)
     if not (held.size and before.size):
         return None
     return float(held.mean() - before.mean()) * run.newtons_per_tesla
+
+
+def _late(run: Measurement, trial: MeasuredTrial) -> tuple[float, float]:
+    """The second half of a trial's hold as far as the field had settled, s."""
+    settled, end = run.settled(trial)
+    start = settled if trial.held is None else trial.held[0]
+    return max(settled, (start + end) / 2), end

@@ -390,19 +390,27 @@ class Measurement:
         found: FloatArray = value[(time >= start) & (time <= end)]
         return found
 
-    def field_held(self, trial: MeasuredTrial) -> FloatArray:
-        """Field read in a trial's hold, T; empty where it has none, or none was read.
+    def settled(self, trial: MeasuredTrial) -> tuple[float, float]:
+        """When the field read was that of a trial's hold, (start, end) s of run time.
 
-        Where the current came after the hold's nominal start, an answer of the source
-        having been lost, what was read until it had settled is none of that hold.
+        What was read until the current had settled is none of that hold. A trial
+        without a level has its own time for it, and only a set-point that came after
+        the hold's start, an answer of the source having been lost, needs more. Empty,
+        its start at its end or later, without a hold, or with too short a one.
         """
         if trial.held is None:
-            return np.empty(0)
+            return trial.start, trial.start
         start, end = trial.held
+        since, until = start, end
+        if trial.level is not None:  # the force came before the middle, and to stay
+            since, until = trial.start, (start + end) / 2
         steps = np.empty(0) if self.current is None else self.current[:, 0]
-        for late in steps[(steps > start) & (steps <= end)]:
-            start = late + SETTLING
-        return self.field_between(start, end)
+        late = steps[(steps > since) & (steps <= until)]
+        return max([start, *late[-1:] + SETTLING]), end
+
+    def field_held(self, trial: MeasuredTrial) -> FloatArray:
+        """Field read in a trial's hold once settled, T; empty where none was."""
+        return self.field_between(*self.settled(trial))
 
     def source_read(self, name: str, trial: MeasuredTrial) -> float | None:
         """Mean of what the source of a voltage read in a trial, V; None if nothing."""

@@ -66,7 +66,8 @@ def _stood(outcome: Outcome) -> tuple[float, float] | None:
     asked, length = outcome.trial.hold, outcome.trial.length
     if asked is None or not outcome.trial.level or not len(outcome.current):
         return asked
-    return stood(asked, Waveform.stairs(outcome.current, length), 0.0, length)
+    current = Waveform.stairs(outcome.current, length)
+    return stood(asked, current, current, 0.0, length)
 
 
 def of_run(source: RunSource) -> list[MeasuredTrial]:

@@ -12,10 +12,14 @@ from typing import TYPE_CHECKING
 from tactile_lab.errors import SceneError
 from tactile_lab.scene.scene import Scene
 from tactile_lab.stimulus.force import ForceProtocol
+from tactile_lab.trial import ROUNDING
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:  # the window counts from here before it has loaded what reads runs
     from tactile_lab.store.stored_run import Records, StoredRun
+
+LEAVES = 1e-3
+"""Part of its fall by which a current has left its hold."""
 
 
 def onsets(run: StoredRun, trials: Records) -> list[float | None]:
@@ -40,6 +44,7 @@ def holds(run: StoredRun, trials: Records) -> list[tuple[float, float] | None]:
     As asked where the trial has no one level, and where the run's scene cannot be read
     any more: its force is not known.
     """
+    current = Waveform.stairs(run.applied.steps, run.duration)
     try:
         force = run.force
     except SceneError:
@@ -53,29 +58,34 @@ def holds(run: StoredRun, trials: Records) -> list[tuple[float, float] | None]:
         elif force is None or not abs(level) > 0:
             found.append(asked)
         else:
-            found.append(stood(asked, force, start, end))
+            found.append(stood(asked, force, current, start, end))
     return found
 
 
 def stood(
-    asked: tuple[float, float], applied: Waveform, start: float, end: float
+    asked: tuple[float, float],
+    force: Waveform,
+    current: Waveform,
+    start: float,
+    end: float,
 ) -> tuple[float, float]:
-    """When `applied` stood in a trial that holds one level, s from its start.
+    """When the force stood in a trial that holds one level, s from its start.
 
-    From when it came within 1 % of what it was amid the hold, no earlier than asked, to
-    when it began to leave that, no later than the trial.
+    From when it came within 1 % of what it was amid the hold to just before the current
+    began to leave that, both no earlier than asked.
 
     Args:
         asked: (start, end) of the hold, s from the trial's start.
-        applied: force or current.
-        start: of the trial, s on the axis of `applied`.
+        force: as applied, N; the current itself where the lags behind it do not count.
+        current: as applied, A.
+        start: of the trial, s on the axis of both.
         end: of the trial, likewise.
     """
     middle = start + (asked[0] + asked[1]) / 2
-    came = max(start + asked[0], applied.arrival(middle, start))
-    left = applied.departure(middle, end)
-    over = start + asked[1] if left is None else max(start + asked[1], left)
-    return came - start, over - start
+    came = force.arrival(middle, start)
+    left = current.departure(middle, end, LEAVES)
+    over = asked[1] if left is None else left - start - ROUNDING
+    return max(asked[0], came - start), max(asked[1], over)
 
 
 def begun(asked: float, applied: Waveform, start: float, end: float) -> float | None:

@@ -28,6 +28,8 @@ from tactile_lab.store.summary import RunSummary
 from tactile_lab.waveform import Waveform
 
 LEVELS = (0.05, 0.1)
+CAME = np.array([[0.0, 0.0], [0.95, 0.25]])
+"""A current that stood from 0.95 s on, s and A."""
 
 
 def test_repeat_tells_the_decrement():
@@ -131,6 +133,21 @@ def test_readings_without_scatter_are_no_exact_factor(levels, readings):
     assert "nothing of how far they are off" in found.sentences[0]
     assert found.values["read_over_eq2_uncertainty_95"] is None
     assert not found.budget_line
+
+
+def test_a_field_that_has_not_settled_tells_no_force():
+    """A hold of 0.3 s told forces to ±1.2 mN of what its table called 0 readings."""
+    run = modelled("force_check", [pulse(0.05)])
+    at = np.arange(-1.0, run.duration, 0.1)
+    read = replace(run, field=np.column_stack([at, at]), newtons_per_tesla=18.0)
+    (trial,) = run.trials
+    short = replace(read, trials=(replace(trial, hold=(1.0, 1.25)),), current=CAME)
+    found = find(short)
+    assert found.conclusion.values["F_minus_F0_by_field_N"] == [None]
+    assert found.missing[0].startswith("No F(I) of 50 mN: the field was not read once")
+    assert find(replace(short, trials=run.trials)).conclusion.values[
+        "F_minus_F0_by_field_N"
+    ] != [None], "in a hold of 1 s it was"
 
 
 def test_a_teslameter_that_hangs_is_no_exact_one():
