@@ -434,9 +434,20 @@ class StoredRun:
         return found
 
     def stored(self, name: str) -> int:
-        """Samples of one channel that have a checksum."""
+        """Samples of one channel that have a checksum.
+
+        Raises:
+            RunFolderError: the checksums cannot be read.
+        """
         samples, checks, _ = self.column(name)
-        checked = int(checks["samples"].sum(dtype=np.int64))
+        try:
+            checked = int(checks["samples"].sum(dtype=np.int64))
+        except OSError as error:
+            then = "recover` makes whole a run that was cut off in the midst of a write"
+            raise RunFolderError(
+                f"{self.path / DATA}: the checksums of {name} cannot be read. "
+                f"`tactile-lab {then}; `tactile-lab verify` says what else is damaged."
+            ) from error
         return min(checked, int(samples.shape[0]))
 
     def __repr__(self) -> str:
