@@ -54,12 +54,16 @@ class Selection:
         if run.signals:
             self.average(run.signal(run.signals[0]).interval)
         end = run.duration if self.end is None else self.end
-        found = self.spans(run) if run.samples else self.start < min(end, run.duration)
-        if not found or end <= self.start:
+        part = f"from {show(self.start, 's')} until {show(end, 's')}"
+        if end <= max(self.start, 0.0) or self.start >= run.duration:
             raise RunFolderError(
-                f"The run has nothing from {show(self.start, 's')} until "
-                f"{show(end, 's')}; it lasts {show(run.duration, 's')}. Choose a part "
-                "that begins before it ends."
+                f"The run has nothing {part}; it lasts {show(run.duration, 's')}. "
+                "Choose a part that begins before it ends."
+            )
+        if run.samples and not self.spans(run):
+            raise RunFolderError(
+                f"The run has no sample {part}: that is a planned pause, or a gap. "
+                "Choose a longer part."
             )
 
     def names(self, run: StoredRun) -> tuple[str, ...]:
