@@ -7,7 +7,7 @@ over a serial line comes to both later than asked.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tactile_lab.errors import SceneError
 from tactile_lab.scene.scene import Scene
@@ -44,22 +44,24 @@ def holds(run: StoredRun, trials: Records) -> list[tuple[float, float] | None]:
     As asked where the trial has no one level, and where the run's scene cannot be read
     any more: its force is not known.
     """
-    current = Waveform.stairs(run.applied.steps, run.duration)
     try:
         force = run.force
     except SceneError:
-        force = None
+        return [_asked(row) for row in trials]
+    current = Waveform.stairs(run.applied.steps, run.duration)
     found: list[tuple[float, float] | None] = []
     for row in trials:
-        asked = float(row["hold_start"]), float(row["hold_end"])
-        start, end, level = (float(row[name]) for name in ("start", "end", "level"))
-        if math.isnan(asked[0]):
-            found.append(None)
-        elif force is None or not abs(level) > 0:
-            found.append(asked)
-        else:
-            found.append(stood(asked, force, current, start, end))
+        asked = _asked(row)
+        if asked is not None and abs(row["level"]) > 0:  # no NaN is
+            asked = stood(asked, force, current, float(row["start"]), float(row["end"]))
+        found.append(asked)
     return found
+
+
+def _asked(trial: Any) -> tuple[float, float] | None:
+    """(start, end) of the hold asked for, s from the trial's start, or None."""
+    start, end = float(trial["hold_start"]), float(trial["hold_end"])
+    return None if math.isnan(start) else (start, end)
 
 
 def stood(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tactile_lab.arrays import FloatArray
 from tactile_lab.quantity import show
 from tactile_lab.signals import SIGNALS
+from tactile_lab.store.applied_trial import holds
 from tactile_lab.store.derived import DERIVED, derivable, derivation
 from tactile_lab.store.folder import SCENE, told_status
 from tactile_lab.store.overrange import told as overrange_told
@@ -110,8 +111,9 @@ def dated_current(run: Run) -> NDArray[Any]:
 
 
 def _trials(run: Run) -> ExportTable:
-    rows, held = run.trials, run.holds
-    stood = np.array([hold or (np.nan, np.nan) for hold in held]).reshape(-1, 2)
+    rows = run.trials
+    held = [hold or (np.nan, np.nan) for hold in holds(run, rows)]
+    stood = np.array(held).reshape(-1, 2)
     columns = {
         "index": rows["index"],
         "label": _plain(rows["label"]),
