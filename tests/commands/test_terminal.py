@@ -139,6 +139,14 @@ def test_colour_is_for_terminals_and_not_where_it_is_unwanted(monkeypatch):
     assert "31m" not in unwanted.getvalue()
 
 
+@pytest.fixture
+def _ctrl_c_as_python_has_it():
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("_ctrl_c_as_python_has_it")
 def test_a_ctrl_c_that_was_swallowed_ends_the_work_at_its_next_update():
     reached = []
     with pytest.raises(KeyboardInterrupt), progress("writing") as update:
