@@ -55,21 +55,22 @@ class RateForce(Recovering, Levels):
     def conclude(self, run: Measurement) -> Conclusion:
         """The critical force, the slope above it, and the rates beside Eq. (15)."""
         found = critical_force(run, self.ramp, self.hold)
-        return found + _slope(run) + _beside_eq15(run) if run.searched else found
+        if not run.searched:
+            return found
+        return found + _slope(run, self.ramp) + _beside_eq15(run, self.ramp)
 
     def plots(self, run: Measurement) -> Iterator[Plot]:
         """Rate against force, and Eq. (15)."""
         forces = [t.level for t in run.results if t.level is not None]
-        ramp = next((t.hold[0] for t in run.results if t.hold is not None), None)
         expected: tuple[Series, ...] = ()
-        if run.circuit is not None and ramp is not None and forces:
+        if run.circuit is not None and forces:
             low, high = min(forces), max(forces)
             low, high = (
                 low * (0.9 if low > 0 else 1.03),
                 high * (1.03 if high > 0 else 0.9),
             )
             swept = np.linspace(low, high, 400)
-            rate = [eq15_rate(run.circuit, float(f), ramp) for f in swept]
+            rate = [eq15_rate(run.circuit, float(f), self.ramp) for f in swept]
             expected = (
                 Series(x=swept, y=rate, name="Eq. (15)", mark="dashed", colour="I_DS"),
             )
@@ -83,7 +84,7 @@ class RateForce(Recovering, Levels):
         )
 
 
-def _slope(run: Measurement) -> Conclusion:
+def _slope(run: Measurement, ramp: float) -> Conclusion:
     """The local slope of rate over force by Eq. (15), at the least and largest force.
 
     V_GS and the force's scale are fitted to the intervals in the holds.
@@ -111,13 +112,12 @@ def _slope(run: Measurement) -> Conclusion:
     except NotIdentifiableError as reason:
         return Conclusion((), {"slopes": None}, (f"No slope: {reason}.",))
     found: list[tuple[float, Estimate]] = []
-    ends = {_level(t): t for t in (min(rated, key=_level), max(rated, key=_level))}
-    for level, t in ends.items():  # one where all forces are equal
-        hold = t.hold or (0.0, 0.0)
-        slope, known = law.slope(level, hold[0]), run.uncertain(level)
+    levels = [_level(t) for t in rated]
+    for level in sorted({min(levels), max(levels)}):  # one where all are equal
+        slope, known = law.slope(level, ramp), run.uncertain(level)
         if known is not None:  # the force is another there, and so is a newton
             off = 1 + known / level
-            other = law.slope(level * off, hold[0]).value * off
+            other = law.slope(level * off, ramp).value * off
             slope = slope.widened(abs(other - slope.value))
         found.append((level, slope))
     told = " and ".join(
@@ -150,7 +150,7 @@ def _level(trial: MeasuredTrial) -> float:
     return trial.level or 0.0
 
 
-def _beside_eq15(run: Measurement) -> Conclusion:
+def _beside_eq15(run: Measurement, ramp: float) -> Conclusion:
     """The highest rates over those of Eq. (15)."""
     ratios = [
         t.response.peak_rate / expected
@@ -159,7 +159,7 @@ def _beside_eq15(run: Measurement) -> Conclusion:
         and t.response.peak_rate is not None
         and t.hold is not None
         and t.level is not None
-        and (expected := eq15_rate(run.circuit, t.level, t.hold[0])) > 0
+        and (expected := eq15_rate(run.circuit, t.level, ramp)) > 0
     ]
     if not ratios:
         return Conclusion()

@@ -86,6 +86,22 @@ def test_slopes_are_local_and_hold_eq_15_s(rate_force):
     assert abs(steep[1] / steep[0] - 1) > 0.2, "one number could not be both"
 
 
+def test_a_coil_that_comes_late_makes_no_longer_ramp(rate_force):
+    """A slope is of a ramp's end: of its own length, without the delay."""
+    late = tuple(
+        replace(t, hold=t.hold and (t.hold[0] + 0.05, t.hold[1] + 0.05))
+        for t in rate_force.trials
+    )
+    (found, as_asked) = (
+        find(replace(rate_force, trials=trials)).conclusion.values
+        for trials in (late, rate_force.trials)
+    )
+    assert len(found["slopes"]) == 2
+    for one, other in zip(found["slopes"], as_asked["slopes"], strict=True):
+        value = other["slope_Hz_per_N"].value
+        assert one["slope_Hz_per_N"].value == pytest.approx(value, rel=1e-3)
+
+
 def test_levels_and_latencies_carry_their_uncertainty(rate_force, tmp_path):
     trials = tuple(replace(t, clock_uncertainty=2e-3) for t in rate_force.trials)
     known = ForceUncertainty(3e-3, 0.04)
