@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from tactile_lab.analysis.error_budget import ErrorBudget
 from tactile_lab.analysis.estimate import Estimate, student_95
+from tactile_lab.arrays import FloatArray
 from tactile_lab.conclusion import Conclusion
 from tactile_lab.measurement import SETTLING, MeasuredTrial, Measurement
 from tactile_lab.quantity import ROUNDING, Duration, Force, Pause, plus_minus, show
@@ -19,6 +20,8 @@ from tactile_lab.trial import Trials
 
 HALF_A_DIGIT = 5e-6
 """Error of a field read off a display that shows 0.01 mT, T."""
+LATE = 0.5
+"""Part of a hold after which its field is read."""
 
 
 class ForceCheck(ForceProtocol):
@@ -77,7 +80,7 @@ class ForceCheck(ForceProtocol):
             for t, force, band in zip(trials, by_field, bands, strict=True)
             if force is not None
         ]
-        missing = _unsettled(run) if run.field_between(0.0, run.duration).size else ()
+        missing = _unsettled(run)
         field = Conclusion(values=values, missing=missing)
         if known:
             said = (
@@ -141,9 +144,9 @@ class ForceCheck(ForceProtocol):
 
 
 def _unsettled(run: Measurement) -> tuple[str, ...]:
-    """Which forces the field tells nothing of, as it was not read once it stood."""
+    """Which forces a field that was read tells nothing of: not once it stood."""
     unread = [t.label for t in run.results if t.held and not run.field_held(t).size]
-    if not unread:
+    if not unread or not run.field_between(0.0, run.duration).size:
         return ()
     return (
         f"No F(I) of {', '.join(unread)}: the field was not read once it had settled, "
@@ -166,8 +169,7 @@ def _budget(
     if force is None or run.newtons_per_tesla is None:
         return None
     scatter = 0.0
-    for part in _late(run, trial), (trial.start - 1.0, trial.start):
-        read = run.field_between(*part)
+    for read in run.field_held(trial, LATE), _before(run, trial):
         # readings that are all alike tell no more than their last digit
         scatters = read.size > 1 and np.ptp(read) > 0
         one = float(read.std(ddof=1)) if scatters else HALF_A_DIGIT
@@ -180,15 +182,12 @@ def _force_by_field(run: Measurement, trial: MeasuredTrial) -> float | None:
     """F(I) - F(0) of a trial from the field in its hold and before it, N."""
     if run.newtons_per_tesla is None:
         return None
-    held = run.field_between(*_late(run, trial))
-    before = run.field_between(trial.start - 1.0, trial.start)
+    held, before = run.field_held(trial, LATE), _before(run, trial)
     if not (held.size and before.size):
         return None
     return float(held.mean() - before.mean()) * run.newtons_per_tesla
 
 
-def _late(run: Measurement, trial: MeasuredTrial) -> tuple[float, float]:
-    """The second half of a trial's hold as far as the field had settled, s."""
-    settled, end = run.settled(trial)
-    start = settled if trial.held is None else trial.held[0]
-    return max(settled, (start + end) / 2), end
+def _before(run: Measurement, trial: MeasuredTrial) -> FloatArray:
+    """Field read in the second before a trial, T."""
+    return run.field_between(trial.start - 1.0, trial.start)

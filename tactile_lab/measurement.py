@@ -390,27 +390,27 @@ class Measurement:
         found: FloatArray = value[(time >= start) & (time <= end)]
         return found
 
-    def settled(self, trial: MeasuredTrial) -> tuple[float, float]:
-        """When the field read was that of a trial's hold, (start, end) s of run time.
+    def field_held(self, trial: MeasuredTrial, after: float = 0.0) -> FloatArray:
+        """Field read in a trial's hold, T; empty where it has none, or none was read.
 
         What was read until the current had settled is none of that hold. A trial
         without a level has its own time for it, and only a set-point that came after
-        the hold's start, an answer of the source having been lost, needs more. Empty,
-        its start at its end or later, without a hold, or with too short a one.
+        the hold's start, an answer of the source having been lost, needs more.
+
+        Args:
+            trial: of the run.
+            after: part of the hold that is left out at its beginning, 0 to 1.
         """
         if trial.held is None:
-            return trial.start, trial.start
+            return np.empty(0)
         start, end = trial.held
         since, until = start, end
         if trial.level is not None:  # the force came before the middle, and to stay
             since, until = trial.start, (start + end) / 2
         steps = np.empty(0) if self.current is None else self.current[:, 0]
         late = steps[(steps > since) & (steps <= until)]
-        return max([start, *late[-1:] + SETTLING]), end
-
-    def field_held(self, trial: MeasuredTrial) -> FloatArray:
-        """Field read in a trial's hold once settled, T; empty where none was."""
-        return self.field_between(*self.settled(trial))
+        begin = max([start + after * (end - start), *late[-1:] + SETTLING])
+        return self.field_between(begin, end)
 
     def source_read(self, name: str, trial: MeasuredTrial) -> float | None:
         """Mean of what the source of a voltage read in a trial, V; None if nothing."""

@@ -40,34 +40,35 @@ def of_outcome(outcome: Outcome, uncounted: str = "") -> MeasuredTrial | None:
     trial = outcome.trial
     if trial.pause:
         return None
+    onset, hold = _applied(outcome)
     return MeasuredTrial(
         label=trial.label,
         level=trial.level,
         start=outcome.start,
         duration=trial.length,
         spike_times=outcome.spike_times,
-        onset=_begun(outcome),
-        hold=_stood(outcome),
+        onset=onset,
+        hold=hold,
         uncounted=uncounted,
         skipped=outcome.skipped,
     )
 
 
-def _begun(outcome: Outcome) -> float | None:
-    """When its current began to change, s from its start; None where it never did."""
-    asked, length = outcome.trial.onset, outcome.trial.length
-    if asked is None or not len(outcome.current):
-        return asked
-    return begun(asked, Waveform.stairs(outcome.current, length), 0.0, length)
+def _applied(
+    outcome: Outcome,
+) -> tuple[float | None, tuple[float, float] | None]:
+    """When its current began to change, and (start, end) of its hold, s from its start.
 
-
-def _stood(outcome: Outcome) -> tuple[float, float] | None:
-    """When its current stood, (start, end) s from its start; None without a hold."""
-    asked, length = outcome.trial.hold, outcome.trial.length
-    if asked is None or not outcome.trial.level or not len(outcome.current):
-        return asked
+    None where it never changed, and without a hold.
+    """
+    trial, length = outcome.trial, outcome.trial.length
+    onset, hold = trial.onset, trial.hold
+    if not len(outcome.current):
+        return onset, hold
     current = Waveform.stairs(outcome.current, length)
-    return stood(asked, current, current, 0.0, length)
+    if onset is not None:
+        onset = begun(onset, current, 0.0, length)
+    return onset, stood(hold, trial.level, current, current, 0.0, length)
 
 
 def of_run(source: RunSource) -> list[MeasuredTrial]:

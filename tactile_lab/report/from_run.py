@@ -36,7 +36,6 @@ from tactile_lab.store.run import Run
 from tactile_lab.store.stored_run import ended
 from tactile_lab.store.uncounted import samples_catch_spikes, uncounted
 from tactile_lab.store.warned import told as warned_told
-from tactile_lab.waveform import Waveform
 
 CELLS = 4000
 """Cells of a trace over the whole run."""
@@ -123,7 +122,7 @@ def _belief(run: Run, scene: Scene) -> Belief | None:
     return Belief(
         circuit=scene.circuit,
         magnet=scene.bench.magnet,
-        setpoint=Waveform.stairs(applied.steps, run.duration),
+        setpoint=run.setpoint,
         followers=scene.bench.followers,
         temperature=scene.sensor.temperature_uncertainty,
         clock=clock or 0.0,

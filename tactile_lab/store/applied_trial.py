@@ -41,21 +41,23 @@ def onsets(run: StoredRun, trials: Records) -> list[float | None]:
 def holds(run: StoredRun, trials: Records) -> list[tuple[float, float] | None]:
     """Of each trial, (start, end) of its hold, s from its start; None without one.
 
-    As asked where the trial has no one level, and where the run's scene cannot be read
-    any more: its force is not known.
+    As asked where the run's scene cannot be read any more: its force is not known.
     """
     try:
         force = run.force
     except SceneError:
         return [_asked(row) for row in trials]
-    current = Waveform.stairs(run.applied.steps, run.duration)
-    found: list[tuple[float, float] | None] = []
-    for row in trials:
-        asked = _asked(row)
-        if asked is not None and abs(row["level"]) > 0:  # no NaN is
-            asked = stood(asked, force, current, float(row["start"]), float(row["end"]))
-        found.append(asked)
-    return found
+    return [
+        stood(
+            _asked(row),
+            float(row["level"]),
+            force,
+            run.setpoint,
+            float(row["start"]),
+            float(row["end"]),
+        )
+        for row in trials
+    ]
 
 
 def _asked(trial: Any) -> tuple[float, float] | None:
@@ -65,24 +67,29 @@ def _asked(trial: Any) -> tuple[float, float] | None:
 
 
 def stood(
-    asked: tuple[float, float],
+    asked: tuple[float, float] | None,
+    level: float | None,
     force: Waveform,
     current: Waveform,
     start: float,
     end: float,
-) -> tuple[float, float]:
-    """When the force stood in a trial that holds one level, s from its start.
+) -> tuple[float, float] | None:
+    """When the force stood in a trial, (start, end) s from its start; None: no hold.
 
     From when it came within 1 % of what it was amid the hold to just before the current
-    began to leave that, both no earlier than asked.
+    began to leave that, both no earlier than asked. As asked without one level, and at
+    0 N, which nothing comes near to by parts.
 
     Args:
-        asked: (start, end) of the hold, s from the trial's start.
+        asked: (start, end) of the hold, s from the trial's start, or None.
+        level: N; None or not a number where the trial has no one level.
         force: as applied, N; the current itself where the lags behind it do not count.
         current: as applied, A.
         start: of the trial, s on the axis of both.
         end: of the trial, likewise.
     """
+    if asked is None or level is None or not abs(level) > 0:
+        return asked
     middle = start + (asked[0] + asked[1]) / 2
     came = force.arrival(middle, start)
     left = current.departure(middle, end, LEAVES)

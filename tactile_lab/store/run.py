@@ -70,13 +70,14 @@ class Run(StoredRun):
             fit_circuit_adaptation,
         )
 
-        held = self.holds[trial]
+        rows = self.trials
+        held = holds(self, rows)[trial]
         if held is None:
             raise NotIdentifiableError("the trial has no hold")
         growing = self.status == "running"
         if why := (uncounted(self) if growing else self._uncounted)[trial]:
             raise NotIdentifiableError(why)
-        start = float(self.trials[trial]["start"])
+        start = float(rows[trial]["start"])
         return fit_circuit_adaptation(
             self.scene.circuit,
             self.spikes["time"],

@@ -391,15 +391,18 @@ class StoredRun:
         return load(self.path / SCENE)
 
     @cached_property
+    def setpoint(self) -> Waveform:
+        """What the coil's source was set to, A: each step until the next."""
+        return Waveform.stairs(self.applied.steps, self.duration)
+
+    @cached_property
     def force(self) -> Waveform:
         """The force that the applied current gives by the run's calibration, N.
 
         Raises:
             SceneError: the run's scene cannot be read any more.
         """
-        magnet = self.scene.bench.magnet
-        current = Waveform.stairs(self.applied.steps, self.duration)
-        return magnet.lagged_force(current)[0]
+        return self.scene.bench.magnet.lagged_force(self.setpoint)[0]
 
     @property
     def field(self) -> Records:

@@ -376,11 +376,13 @@ def test_no_density_of_spikes_is_drawn_where_nobody_looked():
 
 
 def test_a_hold_is_shaded_from_when_its_force_was_there(demo):
-    bands = [g for g in overview(demo).panels[0].guides if g.colour == "band"]
-    held = demo.trials[0].held
-    assert (bands[0].at, bands[0].to) == pytest.approx(held)
-    there = demo.force.arrival(sum(held) / 2, demo.trials[0].start)
-    assert held[0] == pytest.approx(there)
+    first, *others = demo.trials
+    (start, end), (asked, over) = first.held, first.hold
+    late = replace(first, hold=(asked + 0.06, over + 0.06))
+    run = replace(demo, trials=(late, *others))
+    bands = [g for g in overview(run).panels[0].guides if g.colour == "band"]
+    assert bands[0].at == pytest.approx(start + 0.06, abs=0.01)
+    assert bands[0].to == pytest.approx(end + 0.06, abs=0.01)
 
 
 def test_a_single_trial_counts_time_from_its_start(demo):

@@ -117,7 +117,8 @@ def test_impossible_parts_are_refused(run, tmp_path):
         to_csv.export(run, tmp_path, Selection(rate=1e6))
 
 
-BACKWARDS, PAUSE = "begins before it ends", "no sample .*: that is a planned pause"
+BACKWARDS = "The run has nothing from .* begins before it ends"
+PAUSE = "The run has no sample from .*: that is a planned pause"
 
 
 @pytest.mark.parametrize(
