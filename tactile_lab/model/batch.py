@@ -15,6 +15,7 @@ from tactile_lab.model.circuit import LARGEST, LARGEST_VOLTAGE, SMALLEST, Circui
 from tactile_lab.model.compiled import entry, inner, inner_making_arrays, source_stamp
 from tactile_lab.model.need import INTEGRATOR, NODE_A, SPIKES, checked_tolerance
 from tactile_lab.model.rest_pair import rest_of_cascade
+from tactile_lab.model.scratch import read_only
 from tactile_lab.model.solver import MOST_SPIKES
 from tactile_lab.model.state import Start
 from tactile_lab.model.transistor import ALL_PARAMETERS
@@ -142,9 +143,11 @@ def appended(whole: FloatArray, size: int, part: FloatArray, more: int) -> Float
     """The array with `more` of `part` after its first `size`, moved if need be."""
     if size + more > whole.size:
         larger = np.empty(max(2 * whole.size, size + more))
-        larger[:size] = whole[:size]
+        for i in range(size):
+            larger[i] = whole[i]
         whole = larger
-    whole[size : size + more] = part[:more]
+    for i in range(more):
+        whole[size + i] = part[i]
     return whole
 
 
@@ -174,12 +177,14 @@ def train(
     force: FloatArray,
     until: float,
     tolerance: float,
-    keep_times: bool,
+    asked: int,
     most: float,
     par: FloatArray,
     S: FloatArray,
 ) -> Any:
     """One record's spikes; `begin` holds V_P, V_C1, V_C2 or NaN for the equilibrium.
+
+    Hand it `read_only` arrays but for `begin` and `S`, or it is compiled again.
 
     Returns:
         The kernel's status, and spike times, of which `S` tells the number.
@@ -191,10 +196,7 @@ def train(
         if v >= c.fire_voltage:
             v = c.reset_voltage
     begun(V_P, y, v, force[0], S)
-    return kernel.run(
-        time, force, until, k_F, par, S, tolerance,
-        NODE_A | INTEGRATOR | (SPIKES if keep_times else 0), most,
-    )  # fmt: skip
+    return kernel.run(time, force, until, k_F, par, S, tolerance, asked, most)
 
 
 def _build(stamp: int) -> tuple[Callable[..., Any], ...]:
@@ -215,13 +217,14 @@ def _build(stamp: int) -> tuple[Callable[..., Any], ...]:
         count, status = np.zeros(n, np.int64), np.zeros(n, np.int64)
         first, last = np.full(n, np.nan), np.full(n, np.nan)
         times, size = np.empty(CHUNK if keep_times else 0), 0
+        asked = NODE_A | INTEGRATOR | (SPIKES if keep_times else 0)
         par = np.empty(ALL_PARAMETERS)
         S = np.empty(kernel.FRESH.size)
         for i in range(n):
             k_F = numbers_of(many[i], direct, par)
             status[i], spikes = train(
-                many[i], k_F, begin, time, force, until, tolerance, keep_times, most,
-                par, S,
+                many[i], k_F, begin, time, force, until, tolerance, asked, most,
+                read_only(par), S,
             )  # fmt: skip
             if status[i] != kernel.DONE:
                 continue
@@ -249,7 +252,7 @@ def _build(stamp: int) -> tuple[Callable[..., Any], ...]:
         par = np.empty(ALL_PARAMETERS)
         for i in range(many.size):
             numbers_of(many[i], direct, par)
-            found[i] = rest_of_cascade(par)[0]
+            found[i] = rest_of_cascade(read_only(par))[0]
         return found
 
     return run, forces, rest_voltages

@@ -13,6 +13,7 @@ from typing import Any, cast
 
 from llvmlite import ir
 from numba import types
+from numba.core.imputils import impl_ret_borrowed
 from numba.extending import intrinsic
 
 from tactile_lab.arrays import FloatArray
@@ -60,5 +61,21 @@ def _borrowed(_: Any, array: Any) -> Any:
     return array(array), build
 
 
+@intrinsic
+def _read_only(_: Any, array: Any) -> Any:
+    def build(context: Any, code: Any, signature: Any, arrays: Any) -> Any:
+        # one owner more
+        kind = signature.return_type
+        return impl_ret_borrowed(context, code, kind, arrays[0])  # type: ignore[no-untyped-call]
+
+    return array.copy(readonly=True)(array), build
+
+
 borrowed = cast(Callable[[FloatArray], FloatArray], _borrowed)
 """The same array for compiled code, not counted: its owner must outlive its use."""
+read_only = cast(Callable[[FloatArray], FloatArray], _read_only)
+"""The same array for compiled code, as those of a `Waveform` or circuit come.
+
+numba compiles a function once for arrays that may be written and once for those that
+may not be: 10 s for a solver.
+"""

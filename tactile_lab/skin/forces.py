@@ -157,7 +157,8 @@ def longer(numbers: FloatArray, size: int) -> FloatArray:
     if size <= numbers.size:
         return numbers
     larger = np.empty(2 * size)
-    larger[: numbers.size] = numbers
+    for i in range(numbers.size):
+        larger[i] = numbers[i]
     return larger
 
 

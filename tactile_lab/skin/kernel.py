@@ -13,9 +13,10 @@ from tactile_lab.model import coupled, kernel, spiking
 from tactile_lab.model.batch import appended, begun, numbers_of, train
 from tactile_lab.model.compiled import entry, inner, inner_making_arrays, source_stamp
 from tactile_lab.model.integrator import TAU_L, V_FIRE, Y_CRITICAL, Q_at
-from tactile_lab.model.need import SPIKES
+from tactile_lab.model.need import INTEGRATOR, NODE_A, SPIKES
 from tactile_lab.model.node_a import LAMBDA, TAU, B_at, V_P_at, equilibrium
 from tactile_lab.model.rest_pair import rest_of_both
+from tactile_lab.model.scratch import read_only
 from tactile_lab.model.transistor import (
     ALL_PARAMETERS,
     I_S1,
@@ -72,6 +73,7 @@ def train_of_both(
     force: FloatArray,
     until: float,
     tolerance: float,
+    asked: int,
     most: float,
     par: FloatArray,
     S: FloatArray,
@@ -81,7 +83,7 @@ def train_of_both(
     if v >= c.fire_voltage:
         v = c.reset_voltage
     begun(0.0, y, v, force[0], S)
-    return coupled.run(time, force, until, k_F, par, S, tolerance, SPIKES, most)
+    return coupled.run(time, force, until, k_F, par, S, tolerance, asked, most)
 
 
 def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
@@ -105,8 +107,9 @@ def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
         count, pieces = np.zeros(n, np.int64), np.zeros(n, np.int64)
         largest, error = np.zeros(n), np.zeros(n)
         spikes, size = np.empty(CHUNK), 0
-        rest = np.full(3, np.nan)
-        par = np.empty(ALL_PARAMETERS)
+        rest, asked = np.full(3, np.nan), NODE_A | INTEGRATOR | SPIKES
+        numbers = np.empty(ALL_PARAMETERS)
+        par = read_only(numbers)
         S = np.empty(kernel.FRESH.size)
         for i in range(n):
             if role[i] == DEAD:
@@ -117,8 +120,8 @@ def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
                 spikes = appended(spikes, size, train_i, count[i])
                 size += count[i]
                 continue
-            k_F = numbers_of(many[i], direct, par)
-            par[SATURATES] = 1.0 if saturates else 0.0
+            k_F = numbers_of(many[i], direct, numbers)
+            numbers[SATURATES] = 1.0 if saturates else 0.0
             if surely_silent(abs(k_F) * span[i], par):
                 role[i], largest[i] = UNTOUCHED, np.nan
                 continue
@@ -127,17 +130,17 @@ def _build(stamp: int, saturates: bool) -> Callable[..., Any]:
             )
             largest[i] = F.max()
             pieces[i] = thinned(t, F, (1.0 - SAMPLED) * force_error)
-            t, F = t[: pieces[i]], F[: pieces[i]]
+            t, F = read_only(t[: pieces[i]]), read_only(F[: pieces[i]])
             if surely_silent(highest_V_P(t, F, k_F, par[TAU]), par):
                 role[i] = UNTOUCHED
                 continue
             if saturates:
                 status, found = train_of_both(
-                    many[i], k_F, t, F, until, tolerance, most, par, S
+                    many[i], k_F, t, F, until, tolerance, asked, most, par, S
                 )
             else:
                 status, found = train(
-                    many[i], k_F, rest, t, F, until, tolerance, True, most, par, S
+                    many[i], k_F, rest, t, F, until, tolerance, asked, most, par, S
                 )
             if status != kernel.DONE:
                 role[i] = REFUSED

@@ -1,6 +1,7 @@
 """The twin of the window against the model in one piece."""
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 from hypothesis import given, settings
@@ -10,7 +11,7 @@ from gui.lanes.twin import CLOSE, TwinTraces
 from tactile_lab.acquisition.live_model import LiveModel
 from tactile_lab.engine.events import ModelPart
 from tactile_lab.engine.model_parts import binned, live_part
-from tactile_lab.model.simulate import simulate
+from tactile_lab.model.simulate import Result, simulate
 from tactile_lab.scene.load import load
 from tactile_lab.trace import Trace
 from tactile_lab.waveform import Waveform
@@ -77,12 +78,15 @@ def test_nothing_joined_to_something_is_that() -> None:
     assert line.join(line).time.size == 4
 
 
-RESULT = simulate(
-    SCENE.circuit,
-    Waveform(np.array([0.0, 0.2, 1.5]), np.array([0.0, 0.16, 0.16])),
-    keep=("V_C1", "V_C2", "V_K", "spikes"),
-    until=1.5,
-)
+@cache
+def simulated() -> Result:
+    """Not at import, where every worker that collects would solve, or compile, it."""
+    return simulate(
+        SCENE.circuit,
+        Waveform(np.array([0.0, 0.2, 1.5]), np.array([0.0, 0.16, 0.16])),
+        keep=("V_C1", "V_C2", "V_K", "spikes"),
+        until=1.5,
+    )
 
 
 @given(
@@ -91,10 +95,10 @@ RESULT = simulate(
 )  # fmt: skip
 def test_bins_hold_all_the_model_does(start, width, count, signal) -> None:
     end = start + width
-    spikes = RESULT.spike_times
+    spikes = simulated().spike_times
     assert spikes is not None and spikes.size > 5
     inside = spikes[(spikes >= start) & (spikes < end)]
-    bins = binned([RESULT.solution], [signal], start, end, count)[signal]
+    bins = binned([simulated().solution], [signal], start, end, count)[signal]
     assert np.all(bins.low <= bins.mean) and np.all(bins.mean <= bins.high)
     peak = {"V_C1": 0.0, "V_C2": 3.0, "V_K": 3.0}[signal]
     for spike in inside:
@@ -109,7 +113,7 @@ def parts(
 
     def slice_(start: float, end: float, count: int) -> ModelPart:
         spikes = np.empty(0)
-        bins = binned([RESULT.solution], ["V_C1"], start, end, count)
+        bins = binned([simulated().solution], ["V_C1"], start, end, count)
         return ModelPart(bins, spikes, end)
 
     twin = TwinTraces(lambda *part: asked.append(part))
@@ -141,7 +145,7 @@ def test_a_close_look_is_asked_for_once_and_then_exact(start, width, count) -> N
         drawn = twin.trace("V_C1", start, end, count)
     assert len(asked) == 1, "the answer is as fine as another one would be"
     middle = (drawn.time >= start) & (drawn.time <= end)
-    exact = RESULT.sample("V_C1", drawn.time[middle])
+    exact = simulated().sample("V_C1", drawn.time[middle])
     assert np.allclose(drawn.mean[middle], exact, atol=1e-3)
 
 
