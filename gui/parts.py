@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TypeVar
 
 from PySide6.QtCore import QPoint, QRectF, QSize, Qt
@@ -412,11 +412,11 @@ class Elided(QLabel):
             self.setText(metrics.elidedText(self.whole, right, room))
 
 
-def empty(layout: QLayout) -> None:
-    """Take everything out of a layout and delete it."""
+def empty(layout: QLayout, kept: Collection[QWidget] = ()) -> None:
+    """Take everything out of a layout and delete it, but for what is `kept`."""
     while (item := layout.takeAt(0)) is not None:
         widget = item.widget()
-        if widget is not None:
+        if widget is not None and widget not in kept:
             widget.hide()  # a layout shows its new widgets later, wherever they are
             widget.setParent(None)
             widget.deleteLater()

@@ -93,6 +93,10 @@ class RunCard(QFrame):
         ticks = lines(self.tick, self._mark, spacing=0)
         bar(self, (8, 7, 10, 7), 10, self.thumbnail, (words, 1), ticks)
 
+    def tells(self, entry: RunSummary, apart: str) -> bool:
+        """Whether it says just that, so that no new one is needed."""
+        return self.entry == entry and self._apart == apart
+
     def mark(self, *, chosen: bool, shown: bool) -> None:
         """Show whether it is the chosen one, and whether it is on screen."""
         set_role(self, "run-chosen" if chosen else "run")

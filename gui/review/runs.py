@@ -185,23 +185,20 @@ class RunsView(QWidget):
         self._focused = next(having, self._focused if self.hasFocus() else None)
         if self._focused is not None:
             self.setFocus()  # or Qt would give the keyboard to, and choose, another run
-        empty(self._rows)
-        self.cards = []
         words = self.search.text()
         fitting = [one for one in self._entries if chosen(one) and one.says(words)]
         fitting.sort(key=key, reverse=largest_first)
         listed = fitting[: self._listed]
         apart = _told_apart(listed)
+        before = {card.entry.folder: card for card in self.cards}
+        self.cards = []
         for entry in listed:
-            card = RunCard(entry, self._theme, apart[entry.folder])
-            card.thumbnail.show_thumbnail(self.thumbnails.of(entry.folder))
-            card.tick.setChecked(entry.folder in ticked)
-            card.opened.connect(self.opened)
-            card.chosen.connect(self._choose)
-            card.ticked.connect(self._buttons)
-            card.menu_asked.connect(self._show_menu)
-            card.stepped.connect(partial(self._step, card))
+            card, differs = before.get(entry.folder), apart[entry.folder]
+            if card is None or not card.tells(entry, differs):
+                card = self._card(entry, differs, entry.folder in ticked)
             self.cards.append(card)
+        empty(self._rows, self.cards)
+        for card in self.cards:
             self._rows.addWidget(card)
         self._ask_thumbnails()
         if not fitting:
@@ -218,6 +215,17 @@ class RunsView(QWidget):
             there = [one for one in self.cards if one.entry.folder == self._focused]
             to = next(iter(there or self.cards), None) or self.search
             QTimer.singleShot(0, to, to.setFocus)  # once it is on screen
+
+    def _card(self, entry: RunSummary, apart: str, ticked: bool) -> RunCard:
+        card = RunCard(entry, self._theme, apart)
+        card.thumbnail.show_thumbnail(self.thumbnails.of(entry.folder))
+        card.tick.setChecked(ticked)
+        card.opened.connect(self.opened)
+        card.chosen.connect(self._choose)
+        card.ticked.connect(self._buttons)
+        card.menu_asked.connect(self._show_menu)
+        card.stepped.connect(partial(self._step, card))
+        return card
 
     def _go_to_list(self) -> None:
         """Give the keyboard to the chosen run, or to the first."""

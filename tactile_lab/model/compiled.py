@@ -44,7 +44,7 @@ _LENT = {"_nrt": False}
 def _say_compiling() -> None:
     """Say, once, that code is compiled."""
     logging.getLogger(__name__).warning(
-        "Compiling for this computer, about 20 s; kept for every later run."
+        "Compiling for this computer, 20 s to a minute; kept for every later run."
     )
 
 
