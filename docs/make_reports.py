@@ -35,7 +35,7 @@ STEPS: dict[str, tuple[float, str]] = {
     "saturation": (10, "docs/make_saturation.py"),
     "paper": (2, "docs/make_paper.py"),
     "surprises": (16, f"{BENCHMARKS}/surprises.py --out docs/surprise-figures.md"),
-    "plan": (6, f"{BENCHMARKS}/plan_cost.py --out docs/plan-figures.md"),
+    "plan": (12, f"{BENCHMARKS}/plan_cost.py --out docs/plan-figures.md"),
     "protocols": (5, f"{BENCHMARKS}/protocol_speed.py --out docs/protocol-figures.md"),
     "detection": (
         5,
