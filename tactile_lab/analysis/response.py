@@ -19,6 +19,13 @@ FEWEST = 1.4
 times worse, of one the answer, and its interval, may be anything."""
 NOT_YET = 3.0
 """A cause so many times further from its sine than later on is not yet on it."""
+MOST_LINES = 8
+"""Lines of the answer's noise that are told apart from it, at most."""
+LINE = 30.0
+"""Power of a line over the median of its neighbours': of 2000 bins of noise alone one
+reaches it once in a million times."""
+AROUND = 20
+"""Bins of the spectrum on either side of a line that tell the noise below it."""
 MOST_BESSEL = 0.5819
 """The Bessel function J1 nowhere exceeds this."""
 
@@ -68,7 +75,8 @@ def gain(
         leak: time constant with which a transient dies away, s; fitted if given.
 
     Intervals hold the scatter of the answer, correlated as it is, and the steps. What
-    answers the cause beside its sine, such as steps of a source, is no scatter.
+    answers the cause beside its sine, such as steps of a source, is no scatter, and no
+    more are lines far above the sine, such as the mains' hum: they move it not.
 
     Raises:
         NotIdentifiableError: too few cycles or points, or no cause.
@@ -90,26 +98,32 @@ def gain(
     drift = [np.ones_like(t), slow, slow**2]
     if leak is not None:
         drift.append(np.exp((t[0] - t) / leak))
-    design = np.column_stack([*waves, *drift])
-    inverse = np.linalg.pinv(design)
-    into, out = inverse @ given_by, inverse @ answered
-    given, got = complex(into[0], into[1]), complex(out[0], out[1])
-    if abs(given) < 1e-12:
-        raise NotIdentifiableError(f"there is no cause at {frequency:g} Hz")
-    left = answered - design @ out
-    beside: list[FloatArray] = []
-    # what the cause does beside its sine, such as a source's steps, is no scatter: the
-    # answer follows it, a little late
-    steps = given_by - design @ into
-    if np.abs(steps).max() > 1e-9 * abs(given):
-        beside += [steps, np.gradient(steps)]
-    if code:
-        turn = 2 * np.pi * (design @ out) / code
-        beside += [np.sin(turn), np.cos(turn)]
-    if beside:
-        known = np.column_stack(beside)
-        known -= design @ (inverse @ known)
-        left -= known @ (np.linalg.pinv(known) @ left)
+    lines: list[FloatArray] = []
+    while True:
+        design = np.column_stack([*waves, *drift, *lines])
+        inverse = np.linalg.pinv(design)
+        into, out = inverse @ given_by, inverse @ answered
+        given, got = complex(into[0], into[1]), complex(out[0], out[1])
+        if abs(given) < 1e-12:
+            raise NotIdentifiableError(f"there is no cause at {frequency:g} Hz")
+        left = answered - design @ out
+        beside: list[FloatArray] = []
+        # what the cause does beside its sine, such as a source's steps, is no scatter:
+        # the answer follows it, a little late
+        steps = given_by - design @ into
+        if np.abs(steps).max() > 1e-9 * abs(given):
+            beside += [steps, np.gradient(steps)]
+        if code:
+            turn = 2 * np.pi * (design @ out) / code
+            beside += [np.sin(turn), np.cos(turn)]
+        if beside:
+            known = np.column_stack(beside)
+            known -= design @ (inverse @ known)
+            left -= known @ (np.linalg.pinv(known) @ left)
+        found = _line(left, above=(HARMONICS + 1) * cycles)
+        if not found or len(lines) >= MOST_LINES * len(found):
+            break
+        lines += found
     freedom = t.size - design.shape[1] - len(beside)
     alike = correlated(left)
     scatter = math.sqrt(float(np.sum(left**2)) / max(freedom, 1))
@@ -143,3 +157,31 @@ def _begun(time: FloatArray, cause: FloatArray, frequency: float) -> int:
     usual = float(np.sqrt(np.mean(away[half:] ** 2)))
     not_yet = np.flatnonzero(away[:half] > NOT_YET * usual + 1e-9 * np.ptp(cause))
     return int(not_yet[-1]) + 1 if not_yet.size else 0
+
+
+def _line(left: FloatArray, above: float) -> list[FloatArray]:
+    """The largest line in a residual's spectrum: what it is made of; [] if none is.
+
+    Beside sine and cosine these have what a line that comes and goes, or lies a little
+    beside, has: the same times time.
+
+    Args:
+        left: shape (n,), evenly spaced.
+        above: cycles in it from which on to look.
+    """
+    window = np.hanning(left.size)
+    size = np.abs(np.fft.rfft(left * window))
+    first = math.ceil(above) + AROUND
+    if size.size < first + AROUND:
+        return []
+    at = first + int(np.argmax(size[first : size.size - 2]))
+    near = np.r_[size[at - AROUND : at - 3], size[at + 4 : at + AROUND + 1]]
+    if size[at] ** 2 <= LINE * float(np.median(near**2)):
+        return []
+    # between two bins: of a sine, this window makes the larger neighbour tell where
+    side = 1 if size[at + 1] > size[at - 1] else -1
+    ratio = size[at + side] / size[at]
+    cycles = at + side * (2 * ratio - 1) / (1 + ratio)
+    slow = np.linspace(-1, 1, left.size)
+    phase = np.pi * cycles * (left.size - 1) / left.size * slow
+    return [f(phase) * part for part in (1, slow) for f in (np.sin, np.cos)]

@@ -127,3 +127,32 @@ def test_too_little_is_refused():
             gain(cut, np.sin(np.pi * cut), np.sin(np.pi * cut - 0.7), 0.5)
     with pytest.raises(NotIdentifiableError, match="no cause"):
         gain(TIME, np.zeros_like(TIME), np.sin(TIME), 0.5)
+
+
+@pytest.mark.parametrize("mains", [49.93, 50.0, 60.0])
+def test_a_hum_far_from_the_sine_is_no_scatter(mains):
+    """It counted as white noise: the intervals were 17 times too wide."""
+    time, f, n = np.arange(0, 7.5, 0.0091), 0.4, 30
+    wave = 2 * np.pi * f * time
+    off, half = np.empty((2, n)), np.empty((2, n))
+    for seed in range(n):
+        rng = np.random.default_rng(seed)
+        hum = 14e-3 * np.sin(2 * np.pi * mains * time + rng.uniform(0, 2 * np.pi))
+        answer = 0.12 * np.sin(wave - 0.7) + hum + rng.normal(0, 0.8e-3, time.size)
+        found = gain(time, 0.05 * np.sin(wave), answer, f)
+        off[:, seed] = found.gain.value - 2.4, found.phase.value + 0.7
+        half[:, seed] = found.gain.half, found.phase.half
+    assert np.all(half < 3 * off.std(axis=1, keepdims=True))
+    assert np.all((np.abs(off) < half).mean(axis=1) >= 0.9)
+
+
+def test_slow_noise_stays_in_the_interval():
+    """What is slower than the bins are is no hum."""
+    time, f, n = np.arange(0, 7.5, 0.0091), 0.4, 30
+    wave, off, half = 2 * np.pi * f * time, np.empty(n), np.empty(n)
+    for seed in range(n):
+        noise = np.random.default_rng(seed).normal(0, 1e-3, time.size + 200)
+        slow = np.convolve(noise, np.exp(-np.arange(200) / 3), "valid")[: time.size]
+        found = gain(time, 0.05 * np.sin(wave), 0.12 * np.sin(wave) + slow, f)
+        off[seed], half[seed] = found.gain.value - 2.4, found.gain.half
+    assert np.mean(half) > 1.5 * np.std(off)
