@@ -25,6 +25,8 @@ class Drive:
             the other ways.
         force: N, as the bench believes it comes from `points`; None for set-points,
             whose force depends on what was before.
+        stairs: what flows of it by set-points, each from when the source acts on it, A;
+            None for the other ways.
         error: largest difference between the force asked for and the one given, N;
             None where the trial asks for a current.
         why: why this way.
@@ -36,6 +38,7 @@ class Drive:
     points: CurrentList | None = None
     gain: float | None = None
     force: Waveform | None = None
+    stairs: Waveform | None = None
     error: float | None = None
     why: str = ""
     warning: str | None = None

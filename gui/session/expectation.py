@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gui.lanes.expected import Preview, Stretch
 from tactile_lab.engine.request import Request
+from tactile_lab.store.applied_trial import stood
 from tactile_lab.trial import BASELINE
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from tactile_lab.engine.engine import Engine
     from tactile_lab.planning.estimate import Cost
     from tactile_lab.planning.needs import Needs
+    from tactile_lab.planning.outcome import Step
     from tactile_lab.planning.plan import Plan
     from tactile_lab.scene.scene import Scene
     from tactile_lab.scene.tables import Record
@@ -74,7 +76,7 @@ def _preview(made: Plan) -> Preview:
     """The plan's own prediction on the run's axis, which starts a baseline earlier."""
     drive, result = made.timeline, made.preview
     length = drive.duration + BASELINE
-    holds = [Stretch.of(step.trial, step.start + BASELINE) for step in drive.steps]
+    holds = [_stretch(step) for step in drive.steps]
     force, none = drive.force.shifted(BASELINE), np.empty(0)
     if result is None:
         return Preview(force, {}, none, holds, length)
@@ -91,6 +93,14 @@ def _preview(made: Plan) -> Preview:
     spikes = none if result.spike_times is None else result.spike_times
     spikes = spikes[drive.streams_at(spikes)] + BASELINE  # others nobody sees
     return Preview(force, traces, spikes, holds, length)
+
+
+def _stretch(step: Step) -> Stretch:
+    """A trial, held while the force it is given stands still."""
+    trial, start = step.trial, step.start + BASELINE
+    found = Stretch.of(trial, start)
+    held = stood(trial.hold, trial.level, step.force, step.force, 0.0, trial.length)
+    return replace(found, held=held and (start + held[0], start + held[1]))
 
 
 def _around(spikes: np.ndarray, length: float) -> np.ndarray:

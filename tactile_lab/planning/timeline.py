@@ -162,7 +162,8 @@ class _Driver:
             drive = self._played(trial)
             current = drive.current
             if drive.force is None:
-                force, self._field = magnet.lagged_force(current, self._field)
+                given = current if drive.stairs is None else drive.stairs
+                force, self._field = magnet.lagged_force(given, self._field)
             else:
                 force, self._field = drive.force, (0.0, 0.0)
             self._wait_for_load(drive)

@@ -120,9 +120,6 @@ def _set_points(
     """Played by set-points, one each `interval` s."""
     played, warning = limited(wanted, coil.limits.slew, interval, before)
     played = cut(played, wanted.end)
-    why = f"one each {show(interval, 's', 3)}"
-    if asked is None:
-        return Drive(played, why=why, warning=warning)
     starts = np.arange(0.0, wanted.end, interval)
     # a value is of the time at which it is sent, and the source acts on it later
     acts = starts + interval / MARGIN
@@ -130,9 +127,12 @@ def _set_points(
     steps = np.concatenate([[[0.0, before]], steps])
     new = np.abs(np.diff(steps[:, 1], prepend=np.inf)) > 0
     stairs = cut(Waveform.stairs(steps[new], wanted.end), wanted.end)
+    why = f"one each {show(interval, 's', 3)}"
+    drive = Drive(played, stairs=stairs, why=why, warning=warning)
+    if asked is None:
+        return drive
     given, _ = magnet.lagged_force(stairs, (before, before))
-    error = _difference(asked, given)
-    return Drive(played, error=error, why=why, warning=warning)
+    return replace(drive, error=_difference(asked, given))
 
 
 def _finest(wanted: Waveform, promised: float) -> float:

@@ -1,6 +1,7 @@
 """What a plan says of a run's size and codes, beside what the run then has stored."""
 
 import h5py
+import numpy as np
 import pytest
 from benches import WITH_GAPS
 
@@ -71,3 +72,22 @@ def test_a_run_lasts_as_long_as_planned_and_has_one_duration(run_scene):
     run = ran.stored()
     assert ran.done.duration == pytest.approx(told.duration, rel=0.02)
     assert ran.done.duration == run.info["duration_s"] == pytest.approx(run.duration)
+
+
+def test_the_plan_has_the_stairs_that_the_coil_plays(run_scene):
+    """A ramp of 60 ms is two set-points: 15 spikes were planned, 50 ms too early."""
+    scene = (
+        "protocol.levels=['200 mN', '250 mN', '150 mN']",
+        "protocol.ramp=60 ms",
+        "protocol.hold=0.2 s",
+    )
+    planned = plan(load("demo", scene))
+    ran = run_scene(*scene).stored()
+    seen = ran.spikes["time"] - ran.trials["start"][0]
+    times = planned.preview.spike_times
+    assert planned.spikes == times.size == seen.size == 14
+    assert times[0] == pytest.approx(seen[0], abs=0.01)
+    # it acts on a set-point sooner than it promises, by less than an exchange
+    assert planned.timeline.force.at([0.1, 0.2]) == pytest.approx(
+        ran.force.at(ran.trials["start"][0] + np.array([0.1, 0.2])), rel=0.01
+    )
