@@ -7,12 +7,14 @@ SI.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Protocol
 
 from tactile_lab.clock import Clock
 from tactile_lab.current_list import CurrentList, ListCapability
+from tactile_lab.follower import IDEAL, Follower
 from tactile_lab.generator import AnalogueInput, Generator
 from tactile_lab.quantity import Unit, show
 from tactile_lab.scope import Scope
@@ -78,6 +80,13 @@ class Followers(SceneTable):
     offset_uncertainty: Annotated[float, Unit("V", least=0.0)] = 0.0
     bandwidth: Annotated[float, Unit("Hz", least=0.0)] = 3e6
     slew: Annotated[float, Unit("V/s", above=0.0)] = 13e6
+
+    @property
+    def speed(self) -> Follower:
+        """Pole and slew; ideal where they are infinitely fast."""
+        if self.bandwidth == 0:
+            return IDEAL
+        return Follower(1 / (2 * math.pi * self.bandwidth), self.slew)
 
 
 @dataclass(frozen=True)

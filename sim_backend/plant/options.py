@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from sim_backend.plant.chain import Follower
 from sim_backend.plant.electromagnet import Electromagnet
 from sim_backend.plant.noise import SensorNoise
 from sim_backend.plant.winding import Winding
 from tactile_lab.errors import ParameterError
+from tactile_lab.follower import Follower
 from tactile_lab.scene.tables import NOISE
 
 SCOPE_NOISE = {**NOISE, "field": 1e-3, "temperature": 0.5e-3}

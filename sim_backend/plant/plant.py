@@ -13,7 +13,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_backend.plant.chain import Pulse
 from sim_backend.plant.coupling import Capacitor
 from sim_backend.plant.driven_coil import DrivenCoil
 from sim_backend.plant.electromagnet import Electromagnet
@@ -24,6 +23,7 @@ from sim_backend.plant.scope_input import PLACED, ScopeInput, scope_inputs
 from sim_backend.plant.sensor import NEEDS, SimulatedSensor
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import ParameterError
+from tactile_lab.follower import Pulse
 from tactile_lab.magnetics import Magnet
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.temperature import temperature
@@ -106,7 +106,7 @@ class Plant(DrivenCoil):
         self._kelvin = temperature(self.circuit)
         warmer = options.warmer if options.warming else None
         self._sensor = SimulatedSensor(self.circuit, self._drive, fire, warmer)
-        swing = self.circuit.fire_voltage - self.circuit.reset_voltage
+        swing = self.circuit.swing
         self._spike = options.speed.spike(swing, self.circuit.tau_K)
         self._edge = options.speed.edge(swing)
         self._rendered = 0.0

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from numpy import int16
 from numpy.typing import NDArray
 
-from sim_backend.plant.chain import Pulse
 from sim_backend.plant.options import PlantOptions
 from sim_backend.plant.pieces import Pieces
 from tactile_lab.arrays import FloatArray
+from tactile_lab.follower import Pulse
 from tactile_lab.scope import Channel
 
 BUFFERED = ("V_C1", "V_C2", "V_K")

@@ -76,11 +76,9 @@ class SpikeSearch:
         gain, offset = stream.volts_per_code(self.row(stream))
         refractory = round(chosen.refractory / stream.interval)
         if self.signal != "V_K":
-            circuit = self._scene.circuit
-            swing = circuit.fire_voltage - circuit.reset_voltage
             return Detection(
                 signal=self.signal,
-                threshold=round(swing / 2 / gain),
+                threshold=round(self._scene.circuit.swing / 2 / gain),
                 hysteresis=1,
                 refractory=refractory,
                 kind="reset",

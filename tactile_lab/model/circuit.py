@@ -223,19 +223,10 @@ class Circuit(SceneTable):
             return self.V_reset
         return _PUT["V_reset"] if self.firing == "put" else 0.0
 
-    def spike_width(self, threshold: float) -> float:
-        """Time V_K stays above `threshold` V at a spike, s; 0 if it is never there."""
-        height = self.fire_voltage - self.reset_voltage
-        return self.tau_K * math.log(height / threshold) if height > threshold else 0.0
-
-    def shows_spikes(self, threshold: float, rate: float) -> bool:
-        """Whether no spike above `threshold` V fits between two samples of V_K.
-
-        Args:
-            threshold: on V_K, V.
-            rate: of the samples, S/s.
-        """
-        return rate * self.spike_width(threshold) >= 1
+    @property
+    def swing(self) -> float:
+        """What V_C2 falls by at a spike, and V_K jumps to, V."""
+        return self.fire_voltage - self.reset_voltage
 
     @property
     def reset_time(self) -> float:

@@ -69,7 +69,7 @@ def I_C(circuit: Circuit, V_C1: ArrayLike) -> FloatArray:
 def shortest_interval(circuit: Circuit) -> float:
     """Less than any interval between two spikes, s: of C2 charged as at V_C1 = 0 V."""
     most = float(I_C(circuit, 0.0)) + circuit.I_bias
-    return circuit.C2 * (circuit.fire_voltage - circuit.reset_voltage) / most
+    return circuit.C2 * circuit.swing / most
 
 
 def T1_currents(

@@ -236,7 +236,7 @@ class Solution:
         known = last >= 0
         since = t[known] - spikes[last[known]]
         c = self.circuit
-        height = c.fire_voltage - c.reset_voltage
+        height = c.swing
         if c.tau_K > 0:
             # beyond 600 time constants there is nothing left but slow denormals
             out[known] = np.where(

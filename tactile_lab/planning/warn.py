@@ -108,7 +108,12 @@ def _exchanged(scene: Scene, needed: Needs) -> Iterator[str]:
 
 def spike_width(scene: Scene) -> float:
     """Time a spike stays above the threshold, s; 0 if it never reaches it."""
-    return scene.circuit.spike_width(threshold_of(scene))
+    return scene.spike_width(threshold_of(scene))
+
+
+def _height(scene: Scene) -> float:
+    """How high V_K rises at a spike as the scope sees it, V."""
+    return 0.0 if scene.spike is None else scene.spike.peak
 
 
 def misses_spikes(scene: Scene, needed: Needs) -> bool:
@@ -116,7 +121,7 @@ def misses_spikes(scene: Scene, needed: Needs) -> bool:
     if needed.detect_on != "V_K":
         return False
     rate = scene.record.sample_rate
-    return not scene.circuit.shows_spikes(threshold_of(scene), rate)
+    return not scene.shows_spikes(threshold_of(scene), rate)
 
 
 def threshold_of(scene: Scene) -> float:
@@ -148,10 +153,10 @@ def _spike_sampling(scene: Scene, needed: Needs) -> Iterator[str]:
     rate, width = scene.record.sample_rate, spike_width(scene)
     interval = 1 / rate
     if width == 0:
-        height = scene.circuit.fire_voltage - scene.circuit.reset_voltage
         yield (
-            f"no spike is high enough: V_K rises to {show(height, 'V')}, the "
-            f"threshold is {show(threshold_of(scene), 'V')}. Lower it."
+            f"no spike is high enough: V_K rises to {show(_height(scene), 'V', 3)} "
+            "behind its follower, the threshold is "
+            f"{show(threshold_of(scene), 'V')}. Lower it."
         )
     elif misses_spikes(scene, needed):
         yield (
@@ -166,12 +171,12 @@ def _spike_sampling(scene: Scene, needed: Needs) -> Iterator[str]:
 def _spikes_cut(scene: Scene, needed: Needs) -> Iterator[str]:
     """That spikes are higher than their channel sees; a sensor may always fire."""
     channel = next((c for c in needed.channels if c.signal == "V_K"), None)
-    height = scene.circuit.fire_voltage - scene.circuit.reset_voltage
+    height = _height(scene)
     if channel is None or channel.coupling != "DC" or height <= channel.span[1]:
         return
     low, high = (show(end, "V") for end in channel.span)
     yield (
-        f"V_K rises to {show(height, 'V')} at a spike, scope input {channel.input} "
+        f"V_K rises to {show(height, 'V', 3)} at a spike, scope input {channel.input} "
         f"sees {low} to {high}: it is cut off there, and heights of spikes are not "
         "told. Choose a larger range."
     )

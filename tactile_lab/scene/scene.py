@@ -11,6 +11,7 @@ from typing import Any
 import tomli_w
 
 from tactile_lab.deviation import Deviation
+from tactile_lab.follower import IDEAL, Pulse
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.state import Start
 from tactile_lab.scene.bench_file import BenchSpec, is_file
@@ -58,6 +59,26 @@ class Scene:
         if followers is None:
             return self.sensor.circuit
         return replace(self.sensor.circuit, I_bias=followers.input_bias)
+
+    @cached_property
+    def spike(self) -> Pulse | None:
+        """V_K at a spike as the scope sees it, behind a follower; None without R_k."""
+        followers = self.bench.followers
+        speed = IDEAL if followers is None else followers.speed
+        return speed.spike(self.circuit.swing, self.circuit.tau_K)
+
+    def spike_width(self, threshold: float) -> float:
+        """Time V_K stays above `threshold` V at a spike, s; 0 if it is never there."""
+        return 0.0 if self.spike is None else self.spike.width(threshold)
+
+    def shows_spikes(self, threshold: float, rate: float) -> bool:
+        """Whether no spike above `threshold` V fits between two samples of V_K.
+
+        Args:
+            threshold: on V_K, V.
+            rate: of the samples, S/s.
+        """
+        return rate * self.spike_width(threshold) >= 1
 
     @property
     def displaced(self) -> dict[str, Circuit]:

@@ -9,6 +9,7 @@ from tactile_lab.errors import SceneError
 from tactile_lab.measurement import BETWEEN_SAMPLES, CUT_OFF, TOO_FAST
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.model.equations import shortest_interval
+from tactile_lab.scene.scene import Scene
 from tactile_lab.spikes.false import are_false
 from tactile_lab.store.overrange import unsearched
 from tactile_lab.store.stored_run import StoredRun
@@ -16,7 +17,7 @@ from tactile_lab.store.stored_run import StoredRun
 
 def uncounted(run: StoredRun) -> list[str]:
     """Why the spikes of each trial are no count; "" where they are one."""
-    blind, spikes, circuit = unsearched(run), run.spikes["time"], _believed(run)
+    blind, spikes, scene = unsearched(run), run.spikes["time"], _scene(run)
     elsewhere = "" if samples_catch_spikes(run) else BETWEEN_SAMPLES
     found = []
     for row in run.trials:
@@ -24,7 +25,7 @@ def uncounted(run: StoredRun) -> list[str]:
         seen = spikes[(spikes >= start) & (spikes < end)]
         if np.any((blind[:, 0] < end) & (blind[:, 1] > start)):
             found.append(CUT_OFF)
-        elif circuit is not None and faster_than(circuit, seen):
+        elif scene is not None and faster_than(scene.circuit, seen):
             found.append(TOO_FAST)
         else:
             found.append(elsewhere)
@@ -45,15 +46,15 @@ def samples_catch_spikes(run: StoredRun) -> bool:
     detection = run.info.get("detection") or {}
     if detection.get("signal") != "V_K":
         return True
-    circuit = _believed(run)
-    return circuit is None or circuit.shows_spikes(
+    scene = _scene(run)
+    return scene is None or scene.shows_spikes(
         detection["threshold_V"], run.info["sample_rate_Hz"]
     )
 
 
-def _believed(run: StoredRun) -> Circuit | None:
-    """The circuit as it is believed to be; None where the scene cannot be read."""
+def _scene(run: StoredRun) -> Scene | None:
+    """The run's scene; None where it cannot be read."""
     try:
-        return run.scene.circuit
+        return run.scene
     except SceneError:
         return None

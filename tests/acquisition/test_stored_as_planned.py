@@ -91,3 +91,22 @@ def test_the_plan_has_the_stairs_that_the_coil_plays(run_scene):
     assert planned.timeline.force.at([0.1, 0.2]) == pytest.approx(
         ran.force.at(ran.trials["start"][0] + np.array([0.1, 0.2])), rel=0.01
     )
+
+
+def test_spikes_that_the_follower_hides_are_planned_as_hidden(run_scene):
+    """They were told to stay above 0.5 V for 37 ns, and a faster scope to see them."""
+    keys = (
+        "sensor.C2=2 pF",
+        "protocol.levels=['150 mN']",
+        "protocol.hold=0.2 s",
+        'simulated.noise={V_K="2 mV"}',
+    )
+    told = "\n".join(plan(load("demo", keys)).warnings)
+    assert "no spike is high enough: V_K rises to 401 mV" in told
+    lower = (*keys, "detect.threshold=0.2 V", "detect.refractory=1 us")
+    lower = (*lower, "record.sample_rate=7 MS/s", "record.signals=['V_K', 'spikes']")
+    planned = plan(load("demo", lower))
+    assert "misses about 41 % of the spikes" in "\n".join(planned.warnings)
+    assert run_scene(*keys).stored().spikes.size == 0
+    seen = run_scene(*lower).stored().spikes.size
+    assert seen / planned.spikes == pytest.approx(0.59, abs=0.06)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim_backend.plant.chain import Follower
+from tactile_lab.follower import Follower
 
 TL074 = Follower(1 / (2 * np.pi * 3e6), 13e6)
 DECAY = 1.5e-6
@@ -64,3 +64,14 @@ def test_a_slow_spike_passes_unchanged() -> None:
     late = time > 1e-5
     exact = 3.2 * np.exp(-time / 1e-3)
     assert pulse.value[late] == pytest.approx(exact[late], rel=2e-3, abs=1e-4)
+
+
+def test_a_spike_shorter_than_the_follower_lasts_as_the_follower_lets_it() -> None:
+    """C2 of 2 pF: it decays in 20 ns, and the output comes to 0.4 V at 13 V/us."""
+    pulse, ideal = TL074.spike(3.213, 20e-9), Follower(0.0, np.inf).spike(3.213, 20e-9)
+    assert pulse is not None and ideal is not None
+    assert pulse.peak == pytest.approx(0.4, abs=0.01)
+    assert pulse.width(0.5) == 0.0
+    assert pulse.width(0.2) == pytest.approx(85e-9, abs=2e-9)
+    assert ideal.peak == 3.213
+    assert ideal.width(0.2) == pytest.approx(20e-9 * np.log(3.213 / 0.2), rel=2e-3)

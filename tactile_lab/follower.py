@@ -7,6 +7,7 @@ offset is added at the input, its input bias is part of the circuit.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -39,6 +40,15 @@ class Pulse:
         """Time after which nothing remains, s."""
         return self.step * (self.value.size - 1)
 
+    @property
+    def peak(self) -> float:
+        """Largest value, V."""
+        return float(self.value.max())
+
+    def width(self, threshold: float) -> float:
+        """Time it stays above `threshold` V, s, within a step; 0 if it never is."""
+        return self.step * float(np.count_nonzero(self.value > threshold))
+
 
 @dataclass(frozen=True)
 class Follower:
@@ -60,6 +70,8 @@ class Follower:
         """Output less input after the input fell by `drop` V at once."""
         return _edge(self, drop) if self.pole > 0 else None
 
+
+IDEAL = Follower(0.0, math.inf)
 
 # kept: a bench is opened for every run, and its pulses are those of the one before
 
