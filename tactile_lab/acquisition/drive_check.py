@@ -30,8 +30,8 @@ SETTLING = 0.3
 """Time after the start of a hold from which field and current must agree, s."""
 
 REACHED = 0.15
-"""Time after the start of a hold from which its current must flow, s; a source is read
-back 0.25 s after its last set-point."""
+"""Time after the start of a hold, or after its current should be there, from which that
+must flow, s; a source is read back 0.25 s after its last set-point."""
 
 STEADY = 0.02
 """Change of the current during a hold, as a part of it, up to which it is steady."""
@@ -155,7 +155,9 @@ def _steady(amperes: FloatArray) -> bool:
 
 def _held(asked: Waveform, current: FloatArray, hold: tuple[float, float]) -> str:
     """What to say of a steady current that was not given all through a hold, s."""
-    begin, end = hold[0] + REACHED, hold[1]
+    # a current that its slew limit holds back, as planned, comes later than the hold
+    come = asked.arrival((hold[0] + hold[1]) / 2, 0.0)
+    begin, end = max(hold[0], come) + REACHED, hold[1]
     if begin >= end:
         return ""
     wanted = asked.at(np.linspace(begin, end, GRID))

@@ -11,6 +11,8 @@ from sim_backend.serial_line.faults import SerialFault
 from tactile_lab.acquisition.events import CoilCurrent, Message, RunState
 from tactile_lab.bench import Reading
 from tactile_lab.planning.needs import needs
+from tactile_lab.planning.plan import plan
+from tactile_lab.scene.load import load
 
 MEASURED = 'record.signals=["V_C1", "coil_current", "field"]'
 
@@ -56,6 +58,18 @@ def test_a_short_hold_with_a_short_rest_is_not_doubted(run_scene):
     """The shunt's mean ended with the trial, that of the read-back 0.2 s later."""
     short = ("protocol.hold=0.3 s", "protocol.rest=0.1 s")
     assert warnings(run_scene(*SHORT, *short, MEASURED)) == []
+
+
+def test_a_ramp_that_the_slew_limit_holds_back_is_told_as_planned_and_no_more(
+    run_scene,
+):
+    """Link, panel and leads were to be checked, for a limit that the plan knew."""
+    keys = (*SHORT, "protocol.ramp=50 ms", "protocol.hold=0.5 s", FORCE)
+    planned = plan(load("demo", keys)).warnings
+    told = [text for text in planned if "5 A/s is the slew limit" in text]
+    assert len(told) == 1
+    assert warnings(run_scene(*keys)) == []
+    assert told[0] in run_scene(*keys).stored().info["warnings"]
 
 
 FORCE = 'record.signals=["force"]'
