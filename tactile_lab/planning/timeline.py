@@ -24,6 +24,9 @@ from tactile_lab.waveform import Waveform
 
 MOST_TRIALS = 10_000
 """A protocol that asks for more never ends, as far as planning is concerned."""
+MOST_BENDS = 200_000
+"""Points of the force that stairs may have, 6 minutes of a sine or an hour of a slow
+ramp; each takes the plan up to 2.3 kB. Trials after that have the current as asked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +155,7 @@ class _Driver:
         self._amperes = 0.0
         self._field = (0.0, 0.0)
         self._heat = 0.0
+        self._bends = 0
         self._voltages: dict[str, float] = {}
         self._loaded: CurrentList | None = None
 
@@ -162,8 +166,7 @@ class _Driver:
             drive = self._played(trial)
             current = drive.current
             if drive.force is None:
-                given = current if drive.stairs is None else drive.stairs
-                force, self._field = magnet.lagged_force(given, self._field)
+                force, self._field = self._by_set_points(drive)
             else:
                 force, self._field = drive.force, (0.0, 0.0)
             self._wait_for_load(drive)
@@ -179,6 +182,16 @@ class _Driver:
         outcome = ModelOutcome(self.model, len(self.steps) - 1)
         self._outcomes.append(outcome)
         return outcome
+
+    def _by_set_points(self, drive: Drive) -> tuple[Waveform, tuple[float, float]]:
+        """The force of stairs, N, and what the lags leave of it."""
+        lagged = self.scene.bench.magnet.lagged_force
+        if drive.stairs is not None:
+            force, field = lagged(drive.stairs, self._field)
+            self._bends += force.time.size
+            if self._bends <= MOST_BENDS:
+                return force, field
+        return lagged(drive.current, self._field)
 
     def _rest_beside(self, trial: Trial) -> None:
         """The rest that is sampled after a pause, and where probes were moved."""

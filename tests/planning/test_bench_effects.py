@@ -2,10 +2,12 @@
 
 import re
 
+import numpy as np
 import pytest
 
 from sim_backend.bench import options, plant_of
 from tactile_lab.engine.execution import Execution
+from tactile_lab.planning import timeline
 from tactile_lab.planning.plan import plan, text
 from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
@@ -43,6 +45,15 @@ def test_the_force_of_a_plan_lags_behind_its_current():
     # whatever the steps of the first ramp, the hold after it comes as much later
     behind = (ideal.integral(1.2) - late.integral(1.2)) / 0.08
     assert behind == pytest.approx(4.1e-3, rel=1e-3)
+
+
+def test_stairs_without_end_are_planned_as_their_ramp(monkeypatch):
+    """The plan of a ramp of three hours took 1.1 GB."""
+    monkeypatch.setattr(timeline, "MOST_BENDS", 2000)
+    force = plan(load("demo"), preview=False).timeline.force
+    early, late = force.at(np.array([0.1, 13.6])) / (0.32 * 0.1, 0.8 * 0.1)
+    assert early < 0.7  # an interval and a half behind
+    assert late == pytest.approx(1 - 4.1e-3 / 0.1, rel=0.01)
 
 
 def test_a_scene_of_before_still_says_what_it_said():
