@@ -13,6 +13,7 @@ from tactile_lab.instruments.registry import coil_capability, scope_capability
 from tactile_lab.planning.heat import cool_down, heat_along
 from tactile_lab.planning.needs import Needs
 from tactile_lab.planning.outcome import Step
+from tactile_lab.planning.ranges import Expected
 from tactile_lab.planning.timeline import Timeline
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scope import Channel, ScopeCapability
@@ -104,7 +105,7 @@ def estimate(scene: Scene, needed: Needs, drive: Timeline) -> Cost:
     trials = [s.trial.length for s in drive.steps if not s.trial.pause]
     streamed, samples = _sampled(scene, needed, np.array(rests + trials))
     stored = samples * len(needed.stored)
-    each = {c.signal: packed(scene, c) for c in needed.channels}
+    each = {c.signal: packed(scene, c, needed.expected) for c in needed.channels}
     each = {name: each[name] for name in needed.stored}
     breaks = sum(_stops_stream(step) for step in drive.steps) if stored else 0
     again = REWRITTEN * scene.record.sample_rate * sum(each.values())
@@ -159,15 +160,20 @@ def _sampled(scene: Scene, needed: Needs, stretches: FloatArray) -> tuple[float,
     return records * (lasts + BLIND), records * samples
 
 
-def packed(scene: Scene, channel: Channel) -> float:
-    """Bytes of one code of a channel, compressed: what its noise leaves of them."""
+def packed(scene: Scene, channel: Channel, expected: Expected) -> float:
+    """Bytes of one code of a channel, compressed: what its noise leaves of them.
+
+    Beyond the channel's range all codes are alike.
+    """
     noise = UNKNOWN_NOISE
     if scene.bench.simulated:
         volts = scene.simulated.noise.get(channel.signal, 0.0)
         noise = volts / channel.range * _scope(scene).codes
     more = GROWS * math.log2(max(1.0, noise))
-    size = OF_BLOCKS + OF_NOISE * math.pow(min(1.0, noise), FALLS) + more
-    return min(float(_width(scene)), size)
+    size = OF_NOISE * math.pow(min(1.0, noise), FALLS) + more
+    if (seen := expected.get(channel.signal)) is not None:
+        size *= 1 - seen.outside(channel)
+    return min(float(_width(scene)), OF_BLOCKS + size)
 
 
 def _width(scene: Scene) -> int:

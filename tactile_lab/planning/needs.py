@@ -17,7 +17,7 @@ from tactile_lab.instruments.registry import (
     scope_capability,
     voltage_capability,
 )
-from tactile_lab.planning.ranges import Extremes, expected, fitted, widened
+from tactile_lab.planning.ranges import Expected, expected, fitted, widened
 from tactile_lab.planning.timeline import Timeline, timeline
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scope import Channel
@@ -45,8 +45,7 @@ class Needs:
         guaranteed_rate: streaming rate the scope's maker guarantees for so many
             channels, S/s; infinite where it is not known.
         gapless: whether the scope streams without gaps; true without a scope.
-        expected: least and largest value that the model gives V_C1 and V_C2, V, where
-            they are streamed.
+        expected: what the model gives V_C1 and V_C2, where they are streamed.
     """
 
     coil: bool
@@ -59,7 +58,7 @@ class Needs:
     detect_on: str | None
     guaranteed_rate: float
     gapless: bool = True
-    expected: Extremes = field(default_factory=dict)
+    expected: Expected = field(default_factory=dict)
 
 
 def compared(scene: Scene, needed: Needs) -> bool:
@@ -191,7 +190,7 @@ def _check_wired(
 def _as_the_scope_can(
     scene: Scene,
     channels: tuple[Channel, ...],
-    seen: Extremes,
+    seen: Expected,
     detect_on: str | None,
 ) -> tuple[tuple[Channel, ...], float, bool]:
     """Channels as they will be set; the rate the scope surely keeps, S/s; gapless."""

@@ -6,7 +6,7 @@ A channel with ``auto_range`` is given a wider range where it would not.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,11 +34,32 @@ between two bends, and not much later than the first."""
 SPARE = 1 / 127
 """Part of a range, one code of 8 bits, that should be left at either end."""
 
-Extremes = Mapping[str, tuple[float, float]]
-"""Least and largest value of a signal by its name, V."""
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What the model gives a signal.
+
+    Attributes:
+        low, high: least and largest value, V.
+        sampled: at even times of what is streamed, shape (n,), V.
+    """
+
+    low: float
+    high: float
+    sampled: FloatArray
+
+    def outside(self, channel: Channel) -> float:
+        """Part of the samples that lie beyond the range of their channel."""
+        low, high = channel.span
+        values = self.sampled
+        return float(np.mean((values < low) | (values > high))) if values.size else 0.0
 
 
-def expected(scene: Scene, channels: Sequence[Channel], drive: Timeline) -> Extremes:
+Expected = Mapping[str, Seen]
+"""By the signal's name."""
+
+
+def expected(scene: Scene, channels: Sequence[Channel], drive: Timeline) -> Expected:
     """What the model expects of V_C1 and V_C2 on DC-coupled channels, V.
 
     A sensor that fires where the model does not takes V_C2 from 0 V up to the voltage
@@ -64,10 +85,15 @@ def expected(scene: Scene, channels: Sequence[Channel], drive: Timeline) -> Extr
     except SolverError:
         return {}
     seen = zip(names, (samples.value for samples in looked), strict=True)
-    told = {name: (float(v.min()), float(v.max())) for name, v in seen}
-    if "V_C2" in told:
-        low, high = told["V_C2"]
-        told["V_C2"] = min(low, 0.0), max(high, scene.circuit.fire_voltage)
+    even = np.linspace(0.0, until, GRID)
+    streamed = drive.streams_at(even)
+    told = {
+        name: Seen(float(v.min()), float(v.max()), v[:GRID][streamed])
+        for name, v in seen
+    }
+    if (fires := told.get("V_C2")) is not None:
+        high = max(fires.high, scene.circuit.fire_voltage)
+        told["V_C2"] = replace(fires, low=min(fires.low, 0.0), high=high)
     return told
 
 
@@ -80,7 +106,7 @@ def _looked_at(force: Waveform, until: float, tau: float) -> FloatArray:
     return np.concatenate([even, after[(after >= 0.0) & (after <= until)]])
 
 
-def fitted(channel: Channel, seen: Extremes, ranges: Sequence[float]) -> Channel:
+def fitted(channel: Channel, seen: Expected, ranges: Sequence[float]) -> Channel:
     """The channel, with the least wider range that sees what is expected of it.
 
     Args:
@@ -106,21 +132,21 @@ def widened(channel: Channel, supply: float, ranges: Sequence[float]) -> Channel
     return replace(channel, range=chosen, offset=-middle, coupling="DC")
 
 
-def beyond(channels: Sequence[Channel], seen: Extremes) -> Iterator[str]:
+def beyond(channels: Sequence[Channel], seen: Expected) -> Iterator[str]:
     """A warning for each channel that is expected to leave its range."""
     for channel in channels:
         if channel.signal not in seen or _sees(channel, seen[channel.signal]):
             continue
-        (low, high), (least, most) = channel.span, seen[channel.signal]
+        (low, high), one = channel.span, seen[channel.signal]
         yield (
             f"{channel.signal} will leave its channel's range, {show(low, 'V')} to "
-            f"{show(high, 'V')}: the model has {show(least, 'V')} to "
-            f"{show(most, 'V')}. Change range or offset in the bench file, or let "
+            f"{show(high, 'V')}: the model has {show(one.low, 'V')} to "
+            f"{show(one.high, 'V')}. Change range or offset in the bench file, or let "
             "auto_range = true choose."
         )
 
 
-def _sees(channel: Channel, extremes: tuple[float, float], spare: float = 0.0) -> bool:
+def _sees(channel: Channel, seen: Seen, spare: float = 0.0) -> bool:
     low, high = channel.span
     spare *= abs(channel.scale)
-    return low + spare <= extremes[0] and extremes[1] <= high - spare
+    return low + spare <= seen.low and seen.high <= high - spare
