@@ -183,7 +183,8 @@ def _print_plan(study: Study, cost: Forecast) -> None:
     if cost.seconds is not None:
         left = cost.points - cost.there
         say(f"time      {_time(cost.seconds)} a point, {_time(cost.seconds * left)} on "
-            "one core")  # fmt: skip
+            f"one core; start and report take about {_time(cost.besides)} "
+            "besides")  # fmt: skip
     if cost.reason:
         warn(f"a point that was tried failed: {cost.reason}")
 
@@ -196,6 +197,7 @@ def _planned(study: Study, cost: Forecast) -> dict[str, Any]:
         "known": cost.there,
         "seconds_a_point": cost.seconds,
         "seconds_on_one_core": None if cost.seconds is None else cost.seconds * left,
+        "seconds_besides": cost.besides,
         "failed": cost.reason or None,
     }
 

@@ -35,6 +35,12 @@ MOST = 100_000
 """Points of one batch."""
 ENOUGH = 0.3
 """Seconds of points, solved at once, whose time tells what the others will take."""
+BESIDES = 6.0
+"""Time that start, data set and report of a study take besides its points, s (measured:
+5.5 to 7 of a few points or 4608)."""
+WORKER = 2.0
+"""Time in which all workers load what simulates a bench, s (measured); what solves the
+model they have from this process."""
 SHELF = "points"
 """Folder of finished points, shared by all studies beside it."""
 PATIENCE = 2.0
@@ -68,12 +74,14 @@ class Forecast:
         there: computed before.
         seconds: a point takes one worker, s, on average over those that were tried;
             None where nothing is left to compute, or all of them failed.
+        besides: start, workers, data set and report take, s.
         reason: why a tried point failed, if one did.
     """
 
     points: int
     there: int
     seconds: float | None
+    besides: float
     reason: str = ""
 
 
@@ -98,7 +106,8 @@ def forecast(study: Study, out: Path) -> Forecast:
         seconds = plan(study.scene, preview=False).estimate.duration
     elif missing.size:
         seconds, reason = _tried(study, points, named, missing)
-    return Forecast(size, size - missing.size, seconds, reason)
+    besides = BESIDES + (WORKER if study.on == "simulated" else 0.0)
+    return Forecast(size, size - missing.size, seconds, besides, reason)
 
 
 def _tried(

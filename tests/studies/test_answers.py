@@ -201,6 +201,7 @@ def test_from_the_command_line_to_a_page(tmp_path: Path) -> None:
     arguments = ["study", str(tmp_path / "grid.toml"), "--out", str(tmp_path)]
     planned = CliRunner().invoke(cli, [*arguments, "--plan"])
     assert "points    2 × 4 = 8, 0 of them known" in planned.output
+    assert "start and report take about 6 s besides" in planned.output
     answer = CliRunner().invoke(cli, [*arguments, "--workers", "1"])
     assert answer.exit_code == 0, answer.output
     assert "first_spike: median" in answer.output
