@@ -376,7 +376,10 @@ class Measurement:
         if trace is None or trace.code is None:
             return 0.0
         inside = (trace.time >= start) & (trace.time <= end)
-        return step_bias(trace.mean[inside], trace.code, trace.samples)
+        extent = None
+        if trace.low is not None and trace.high is not None:
+            extent = (trace.high - trace.low)[inside]
+        return step_bias(trace.mean[inside], trace.code, trace.samples, extent)
 
     def field_between(self, start: float, end: float) -> FloatArray:
         """Field read in [start, end] s of run time, T; empty where none was."""

@@ -17,17 +17,25 @@ from tactile_lab.arrays import FloatArray
 
 POOL, POOLS = 64, 8
 """Bins whose scatter is taken together, and fewest of such pools that tell more."""
+TOGGLING = 1.5
+"""Codes that a bin reaches over where it holds but two."""
 STILL = 0.05
 """Variance, of a code squared, of noise too small to smooth steps, not near an edge."""
 
 
-def step_bias(mean: ArrayLike, code: float, samples: float) -> float:
+def step_bias(
+    mean: ArrayLike, code: float, samples: float, extent: ArrayLike | None = None
+) -> float:
     """How far the mean of a slow signal may be off by its converter's steps.
 
     Args:
         mean: of successive bins, shape (n,); its scatter tells the noise.
         code: one code of the converter, in the same unit.
         samples: number of samples in a bin.
+        extent: highest less lowest sample of each bin, in the same unit, shape (n,).
+            Two codes that a level toggles between are no noise that smooths them,
+            however much they scatter: at an edge any noise makes it, and the level
+            may lie by most of half a code beside the mean.
 
     Returns:
         Half-width, at most half a code.
@@ -36,6 +44,8 @@ def step_bias(mean: ArrayLike, code: float, samples: float) -> float:
     if code <= 0:
         return 0.0
     if bins.size < 3:
+        return code / 2
+    if extent is not None and np.median(extent) < TOGGLING * code:
         return code / 2
     # of second differences, so that a slope is no noise; the median, so that no edge is
     apart = np.abs(bins[2:] - 2 * bins[1:-1] + bins[:-2]) / math.sqrt(6)
