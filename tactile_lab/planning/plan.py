@@ -72,7 +72,7 @@ class Plan:
 
     @cached_property
     def spikes(self) -> int | None:
-        """Of the model, in what is streamed; None where the preview tells none."""
+        """Of the model in what is streamed of trials; None without a preview of any."""
         times = None if self.preview is None else self.preview.spike_times
         return None if times is None else int(self.timeline.streams_at(times).sum())
 
@@ -328,7 +328,10 @@ def _costs(plan: Plan) -> Iterator[tuple[str, str]]:
     if plan.preview is not None and plan.preview.spike_times is not None:
         others = plan.preview.spike_times.size - (plan.spikes or 0)
         unseen = f", {others} more while nothing is streamed" if others else ""
-        yield "spikes", f"{plan.spikes} by the model{unseen}"
+        yield (
+            "spikes",
+            f"{plan.spikes} by the model from the first trial on{unseen}",
+        )
     if carried := plan.carried_over:
         yield "carried over", carried
     if plan.preview is not None:

@@ -509,7 +509,7 @@ def test_why_no_model_is_compared_is_told(scene, why):
 
 def test_no_error_of_spike_times_is_told_where_no_spike_is_expected():
     told = text(plan(load("monitor")))
-    assert "spikes     0 by the model" in told
+    assert "spikes     0 by the model from the first trial on" in told
     assert "spike times within" not in told and "V_C1 within" in told
 
 
@@ -520,7 +520,8 @@ def test_spikes_while_nothing_is_streamed_are_told_apart():
     assert planned.to_dict()["preview"]["spikes"] == 37
     others = planned.preview.spike_times.size - 37
     assert others > 0
-    assert f"37 by the model, {others} more while nothing is streamed" in text(planned)
+    told = f"37 by the model from the first trial on, {others} more while nothing is"
+    assert told in text(planned)
 
 
 def test_a_rate_that_node_a_does_not_need_is_told():
