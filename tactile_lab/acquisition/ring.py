@@ -47,6 +47,11 @@ class RingContents:
         return sum(block.samples for block in self.blocks)
 
     @property
+    def begun(self) -> float:
+        """Clock time of the first sample held, s."""
+        return self.stream.started + self.blocks[0].first * self.stream.interval
+
+    @property
     def length(self) -> float:
         """Duration, s, gaps between records included."""
         first, last = self.blocks[0], self.blocks[-1]
@@ -55,8 +60,7 @@ class RingContents:
     def replay(self, journal: Journal) -> None:
         """Tell it all to a journal whose time begins with the first sample held."""
         first = self.blocks[0].first
-        begun = self.stream.started + first * self.stream.interval
-        journal.segment(replace(self.stream, started=begun), 0.0)
+        journal.segment(replace(self.stream, started=self.begun), 0.0)
         for block in self.blocks:
             journal.append(replace(block, first=block.first - first))
         for times, found in self.spikes:

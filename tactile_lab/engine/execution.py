@@ -254,6 +254,14 @@ class Execution(Task[Executed]):
 
     def _begin_record(self, stream: Stream | None) -> Recorder:
         """Start the record; codes can be scaled from now on."""
+        assert self._runner is not None
+        read_back = self._runner.instruments.settings
+        now = self.bench.clock.now()
+        self.folder.begin(
+            0.0 if stream is None else now - stream.started,
+            instruments=read_back,
+            temperature=temperature(self.scene, read_back),
+        )
         self._recorder = Recorder(
             self.folder,
             layout(self.plan, self.bench, self.folder, self._search, stream),

@@ -194,6 +194,7 @@ class Monitor(Task[Ending]):
         return noise(gain * codes + offset, stream.interval)
 
     def _write(self, folder: RunFolder, held: RingContents) -> None:
+        folder.begin(self.bench.clock.now() - held.begun)
         recorder = Recorder(
             folder, layout(self.plan, self.bench, folder, self._search, held.stream)
         )

@@ -8,7 +8,7 @@ import os
 import re
 import sys
 from collections.abc import Mapping
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import IO, Any, Literal
 
@@ -26,6 +26,9 @@ SEAL = "sha256"
 
 CHANGED = "changed_before_recovery"
 """Key of `run.json`: its hash was wrong when the run was recovered."""
+
+ZERO = "time_zero"
+"""Key of `run.json`: when the run's time was 0; runs of older versions lack it."""
 
 DATA, LOG, SCENE, REPORT = "data.h5", "log.jsonl", "scene.toml", "report.html"
 
@@ -113,6 +116,18 @@ class RunFolder:
         """Put further entries into `run.json`."""
         self.info.update(entries)
         write_info(self.path, self.info)
+
+    def begin(self, ago: float, **entries: Any) -> None:
+        """Put into `run.json` when the run's time was 0, and what is known by then.
+
+        A run that is killed has it as well.
+
+        Args:
+            ago: how long before now that was, s.
+            entries: as `update` takes them.
+        """
+        zero = datetime.now() - timedelta(seconds=ago)
+        self.update(**{ZERO: _iso(zero)}, **entries)
 
     def log(self, kind: str, text: str, **entries: Any) -> None:
         """Append one line to the log."""

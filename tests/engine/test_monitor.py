@@ -57,6 +57,7 @@ def test_record_keeps_the_last_seconds_as_a_whole_run(tmp_path):
             assert run.info["loss"]["produced"] == run.info["loss"]["written"]
         assert verify(path).sound
     with Run.load(folder) as run:
+        assert run.info["time_zero"] < run.info["started"], "made as it was kept"
         assert run.info["notes"]["why"] == "trimmed"
         assert run.info["coil"] == "This scene uses no coil.", "nobody looked at it"
     report = write(folder, read(folder))

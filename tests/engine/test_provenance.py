@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from datetime import datetime, timedelta
 
 import pytest
 
@@ -167,3 +168,33 @@ def test_temperature_is_read_where_nobody_enters_it():
     found = temperature(load("demo"), read_back)
     assert found == {"K": pytest.approx(295.65), "from": "field meter"}
     assert temperature(load("demo"), {}) == {"K": None, "from": None}
+
+
+def test_a_run_tells_from_its_first_sample_on_when_that_was_and_with_what(
+    run_scene, short
+):
+    """Only when the folder was made was kept, 1.5 s before on a bench with links.
+
+    A run that was killed listed no instruments at all.
+    """
+    seen = {}
+
+    def watch(execution, event):
+        now = datetime.now().astimezone()
+        if isinstance(event, events.RecordBegun):
+            seen["ago"] = execution.bench.clock.now() - event.origin
+            seen["info"], seen["after"] = read_info(execution.folder.path), now
+        else:
+            seen.setdefault("before", now)
+
+    ran = run_scene(*short, watch=watch)
+    info, ended = seen["info"], read_info(ran.folder)
+    begun = datetime.fromisoformat(info["time_zero"]) + timedelta(seconds=seen["ago"])
+    cut = timedelta(milliseconds=1)  # what is left of a time as text
+    assert seen["before"] - cut < begun <= seen["after"]
+    assert info["time_zero"] == ended["time_zero"]
+    assert info["temperature"] == ended["temperature"]
+    known, whole = info["instruments"], ended["instruments"]
+    assert {name: it["identity"] for name, it in known.items()} == {
+        name: it["identity"] for name, it in whole.items()
+    }

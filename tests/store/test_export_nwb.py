@@ -1,5 +1,7 @@
 """NWB holds what the other formats hold, at the times that they have."""
 
+from datetime import datetime
+
 import numpy as np
 import pytest
 from peak_memory import peak, tells_peak
@@ -140,6 +142,19 @@ def test_samples_lie_where_their_clock_puts_them(recorded, session):
         times.append(series.starting_time + np.arange(count) / series.rate)
     axis = recorded.signal("V_K").time()
     np.testing.assert_allclose(np.concatenate(times), axis, rtol=0, atol=1e-9)
+
+
+def test_times_are_from_the_moment_of_the_first_sample_on(held, session, monkeypatch):
+    """All were early by the time from the folder's making to the first sample."""
+    read, info = session(held), held.info
+    assert read.acquisition["V_C1"].starting_time == 0.0
+    assert read.session_start_time == datetime.fromisoformat(info["time_zero"])
+    assert info["time_zero"] > info["started"]
+    older = {key: value for key, value in info.items() if key != "time_zero"}
+    monkeypatch.setattr(held, "info", older)
+    read = session(held)
+    assert read.session_start_time == datetime.fromisoformat(info["started"])
+    assert "time_zero: not known" in read.notes
 
 
 def test_silence_is_told_only_of_what_was_listened_to(recorded, session):

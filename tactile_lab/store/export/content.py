@@ -13,7 +13,7 @@ from tactile_lab.quantity import show
 from tactile_lab.signals import SIGNALS
 from tactile_lab.store.applied_trial import holds
 from tactile_lab.store.derived import DERIVED, derivable, derivation
-from tactile_lab.store.folder import SCENE, told_status
+from tactile_lab.store.folder import SCENE, ZERO, told_status
 from tactile_lab.store.overrange import told as overrange_told
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.run import Run
@@ -37,6 +37,9 @@ UNITS = {
     "events": {"time": "s", "kind": "", "text": ""},
 }
 """Exported columns of each table and their SI units."""
+
+NO_ZERO = "not known: the run is of an older version, which did not keep it"
+"""What is told of when a run's time was 0 where that is not known."""
 
 TABLES = (*UNITS, "trials", "remarks")
 """All that `tables` may give."""
@@ -162,6 +165,7 @@ def about(run: Run, selection: Selection | None = None) -> dict[str, str | float
     for key in ("title", "protocol", "scene", "bench", "started", "reason"):
         if info.get(key):
             told[key] = str(info[key])
+    told[ZERO] = info.get(ZERO) or NO_ZERO
     told |= {
         "status": told_status(run.path, run.status),
         "physics": "simulated" if run.simulated else "measured",

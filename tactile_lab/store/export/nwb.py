@@ -21,6 +21,7 @@ from tactile_lab.store.export.content import (
     tables,
 )
 from tactile_lab.store.export.library import library
+from tactile_lab.store.folder import ZERO
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
@@ -148,7 +149,10 @@ def _session(pynwb: Any, run: Run, told: dict[str, str | float]) -> Any:
         session_description=f"{title} on a spiking tactile sensor, {kind}",
         identifier=run.name,
         session_id=run.name,
-        session_start_time=datetime.fromisoformat(run.info["started"]),
+        # all times in the file are from it on
+        session_start_time=datetime.fromisoformat(
+            run.info.get(ZERO) or run.info["started"]
+        ),
         experimenter=[_last_first(notes["operator"])]
         if notes.get("operator")
         else None,
