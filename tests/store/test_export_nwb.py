@@ -163,6 +163,19 @@ def test_silence_is_told_only_of_what_was_listened_to(recorded, session):
     np.testing.assert_allclose(intervals, [[0.0, stretch], [3.0, 3.0 + stretch]])
 
 
+def test_a_part_without_a_spike_passes_nwb_s_own_inspector(held, session, tmp_path):
+    """An empty train ended three of its checks with an error."""
+    inspector = pytest.importorskip("nwbinspector")
+    first = float(held.spikes["time"][0])
+    read = session(held, end=first / 2)
+    assert read.units is None
+    (silent,) = read.intervals["silence"].to_dataframe().to_numpy()[:, :2]
+    np.testing.assert_allclose(silent, [0.0, first / 2], rtol=0, atol=2e-6)
+    told = inspector.inspect_nwbfile(nwbfile_path=tmp_path / "0.nwb")
+    grave = inspector.Importance.CRITICAL.value
+    assert not [one for one in told if one.importance.value >= grave]
+
+
 def test_a_force_that_rests_in_the_part_is_told(held, session):
     begin = float(held.trials["start"][0])
     start, end = begin + 0.9, begin + 0.91

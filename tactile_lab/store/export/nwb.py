@@ -120,20 +120,33 @@ def export(
 def _add_spikes(
     pynwb: Any, session: Any, run: Run, selection: Selection, detection: Detection
 ) -> None:
-    """The train, and when it was listened to: where nothing was, is no silence."""
+    """The train, and when it was listened to: where nothing was, is no silence.
+
+    Without a spike no units: programs take an empty train for a damaged file.
+    """
+    axis, times = run.axis, selection.of(run.spikes)["time"]
+    searched = [
+        [axis.time_of(first), axis.time_of(stop - 1) + axis.step_at(first)]
+        for first, stop in selection.spans(run)
+    ]
+    if not times.size:
+        silent = pynwb.epoch.TimeIntervals(
+            name="silence",
+            description=f"{detection.signal} was listened to and had no spike",
+        )
+        for start, stop in searched:
+            silent.add_interval(start_time=start, stop_time=stop)
+        if searched:
+            session.add_time_intervals(silent)
+        return
     session.units = pynwb.misc.Units(
         name="units",
         description="detected spikes",
         resolution=float(run.attributes["interval"]),
     )
     session.add_unit_column("signal", "the channel the spikes were detected on")
-    axis = run.axis
-    searched = [
-        [axis.time_of(first), axis.time_of(stop - 1) + axis.step_at(first)]
-        for first, stop in selection.spans(run)
-    ]
     session.add_unit(
-        spike_times=selection.of(run.spikes)["time"],
+        spike_times=times,
         signal=detection.signal,
         **({"obs_intervals": searched} if searched else {}),
     )
