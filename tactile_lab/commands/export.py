@@ -114,7 +114,7 @@ def _of_run(run: Path, form: str, out: Path | None, selection: Selection) -> lis
                     sys.stderr,
                 )
         size = module.size(loaded, selection)
-        text = f"writing {target.name}, up to {bytes_text(size)}"
+        text = f"writing {target.name}, about {bytes_text(size)}"
         if size >= LARGE:
             say(text, sys.stderr)
         with progress(text) as update:

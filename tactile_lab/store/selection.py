@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -158,6 +158,25 @@ class Selection:
         spans = self.spans(run)
         count = self.average(run.signal(run.signals[0]).interval) if spans else 1
         return sum(-(-(last - first) // count) for first, last in spans)
+
+    def stretches(self, run: StoredRun, count: int, rows: int) -> list[Selection]:
+        """Parts of `rows` rows each, `count` of them over all; itself where short."""
+        whole = self.rows(run)
+        if whole <= count * rows:
+            return [self] if whole else []
+        begins: NDArray[Any]
+        if run.samples:
+            spans = self.spans(run)
+            size = rows * self.average(run.signal(run.signals[0]).interval)
+            begins = np.linspace(spans[0][0], spans[-1][1] - size, count).astype(int)
+            starts = run.axis.time_of(begins)
+            ends = run.axis.time_of(begins + size - 1)
+        else:
+            (start, end), length = self.ends(run), rows * self._step(run)
+            starts = np.linspace(start, end - length, count)
+            ends = starts + length
+        bounds = zip(starts.tolist(), ends.tolist(), strict=True)
+        return [replace(self, start=start, end=end) for start, end in bounds]
 
     def pieces(self, run: StoredRun) -> Iterator[tuple[FloatArray, list[FloatArray]]]:
         """(times, one array of SI values per signal), a bounded piece at a time.

@@ -18,6 +18,7 @@ from tactile_lab.errors import RunFolderError
 from tactile_lab.scene.load import load
 from tactile_lab.store.export import csv as to_csv
 from tactile_lab.store.export import mat as to_mat
+from tactile_lab.store.export import netcdf as to_netcdf
 from tactile_lab.store.export import ro_crate
 from tactile_lab.store.export.content import about
 from tactile_lab.store.export.lines import fixed, steps, written
@@ -384,3 +385,12 @@ def test_numbers_as_text():
     ]  # fmt: skip
     held = np.array([1.5, 1.5, np.nan, np.nan, -2e-9])
     assert text(steps(held)) == text(written(held)) == ["1.5", "1.5", "", "", "-2e-09"]
+
+
+@pytest.mark.parametrize("part", [{}, {"signals": ("V_C1",)}, {"rate": 10e3}])
+def test_what_netcdf_will_take_is_told_as_it_is(run, tmp_path, part):
+    """It was told twenty times too large, and refused where there was room."""
+    pytest.importorskip("h5netcdf")
+    (file,) = to_netcdf.export(run, tmp_path / "run.nc", Selection(**part))
+    takes, told = file.stat().st_size, to_netcdf.size(run, Selection(**part))
+    assert takes / 2 < told < 2 * takes

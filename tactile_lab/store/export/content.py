@@ -213,14 +213,6 @@ def about(run: Run, selection: Selection | None = None) -> dict[str, str | float
     return told
 
 
-def compressed_size(run: Run, selection: Selection) -> int:
-    """Bytes that a file of single-precision columns takes, at most.
-
-    About four a row and column, time counted twice; compression makes less of most.
-    """
-    return selection.rows(run) * 4 * (2 + len(selection.names(run)))
-
-
 def unit(name: str) -> str:
     """SI unit of a signal; V where it is none this program knows."""
     return SIGNALS[name].unit if name in SIGNALS else "V"

@@ -11,7 +11,6 @@ import numpy as np
 from tactile_lab.store.export.content import (
     TABLES,
     about,
-    compressed_size,
     tables,
     unit,
 )
@@ -21,7 +20,12 @@ from tactile_lab.store.run import Run
 from tactile_lab.store.selection import Selection
 from tactile_lab.whole_file import replacing
 
-size = compressed_size
+DOUBLE, SINGLE = 8, 4
+
+
+def size(run: Run, selection: Selection) -> int:
+    """Bytes the file of signals will take, at most: compression makes less of most."""
+    return selection.rows(run) * (DOUBLE + SINGLE * len(selection.names(run)))
 
 
 def export(
