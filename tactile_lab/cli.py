@@ -125,7 +125,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a pipe's encoding may lack µ or −
     try:
-        code = cli.main(arguments, prog_name="tactile-lab", standalone_mode=False)
+        with terminal.leaving_tidily():
+            code = cli.main(arguments, prog_name="tactile-lab", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as asked:
         asked.show()
         code = asked.exit_code

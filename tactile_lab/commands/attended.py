@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from tactile_lab.commands.terminal import warn
+from tactile_lab.commands.terminal import ENDING, warn
 
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Ending
     from tactile_lab.engine.task import Task
 
-ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 INTERRUPTED = 130
 """Exit code of a program that was asked to end, by Ctrl-C or another program."""
 

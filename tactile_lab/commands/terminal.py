@@ -29,6 +29,9 @@ SHOWN = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160))}
 del SHOWN[ord("\t")], SHOWN[ord("\n")]
 LINE_EVERY = 0.1
 """Part of the whole after which progress writes a line where it is piped."""
+ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+"""Signals that end a program."""
+
 PATIENCE = 10.0
 """Seconds that piped work may take unmentioned."""
 REDRAW_EVERY = 0.1
@@ -176,37 +179,67 @@ def progress(text: str) -> Iterator[Callable[[float], None]]:
     Ctrl-C that was swallowed, in a callback from C, ends the work at its next update.
     """
     with (
-        _noting_interrupts() as heard,
+        _noting_endings() as look,
         ProgressLine(1.0, text, patience=PATIENCE) as line,
     ):
 
         def update(done: float) -> None:
-            if heard:
-                raise KeyboardInterrupt
+            look()
             line.update(done)
 
         yield update
 
 
+def leave(number: int, _: FrameType | None) -> NoReturn:
+    """Leave the program as a signal asks; the next of its kind ends it at once."""
+    signal.signal(number, signal.SIG_DFL)
+    raise SystemExit(128 + number)
+
+
 @contextmanager
-def _noting_interrupts() -> Iterator[list[int]]:
-    """The Ctrl-Cs that came since; each is raised as Python does."""
-    heard: list[int] = []
-
-    def note(number: int, _: FrameType | None) -> NoReturn:
-        heard.append(number)
-        raise KeyboardInterrupt
-
-    # another thread sets no handler, and one that is not Python's minds them itself
+def leaving_tidily() -> Iterator[None]:
+    """Within, SIGTERM and SIGHUP let what is being written be cleared away first."""
     ours = threading.current_thread() is threading.main_thread()
-    if ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, note)
-        try:
-            yield heard
-        finally:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-    else:
-        yield heard
+    numbers = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
+    unminded = [n for n in numbers if ours and signal.getsignal(n) == signal.SIG_DFL]
+    for number in unminded:
+        signal.signal(number, leave)
+    try:
+        yield
+    finally:
+        for number in unminded:
+            signal.signal(number, signal.SIG_DFL)
+
+
+@contextmanager
+def _noting_endings() -> Iterator[Callable[[], None]]:
+    """Looks whether a signal came that ends the program, and raises what it raised."""
+    heard: list[int] = []
+    # another thread sets no handler, and one of another kind minds them itself
+    ours = threading.current_thread() is threading.main_thread()
+    numbers = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
+    handlers: dict[int, Callable[[int, FrameType | None], Any]] = {
+        number: handler
+        for number in (numbers if ours else ())
+        if callable(handler := signal.getsignal(number))
+        and handler in (signal.default_int_handler, leave)
+    }
+
+    def note(number: int, frame: FrameType | None) -> None:
+        heard.append(number)
+        handlers[number](number, frame)
+
+    def look() -> None:
+        if heard:
+            handlers[heard[0]](heard[0], None)
+
+    for number in handlers:
+        signal.signal(number, note)
+    try:
+        yield look
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
 
 
 class StatusLine:

@@ -108,7 +108,7 @@ def recover(path: Path, progress: Progress = nothing) -> Recovered:
             with h5py.File(new, "r+", libver="latest") as file:
                 told = share(progress, 0.0, FILLING)
                 samples, dropped = _fill(file, written, killed, told)
-        except OSError:
+        except BaseException:
             with suppress(OSError):  # it is not there on a disk that may only be read
                 new.unlink(missing_ok=True)
             raise

@@ -1,6 +1,9 @@
 """Exports hold the run's numbers, in units other programs expect."""
 
 import csv
+import os
+import signal
+import subprocess
 import sys
 
 import numpy as np
@@ -196,3 +199,44 @@ def test_nwb_without_pynwb_says_what_to_install(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pynwb", None)
     with pytest.raises(RunFolderError, match="pip install pynwb"):
         nwb.export(run, tmp_path / "run.nwb", Selection())
+
+
+TOLD_TO_END = """
+import os
+import signal
+import sys
+from tactile_lab.cli import main
+from tactile_lab.store.selection import Selection
+
+whole = Selection.pieces
+
+def pieces(self, run):
+    for piece in whole(self, run):
+        try:
+            os.kill(os.getpid(), signal.{name})
+        except BaseException:
+            if not {swallowed}:  # as a callback from C does
+                raise
+        yield piece
+
+Selection.pieces = pieces
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
+@pytest.mark.parametrize("swallowed", [False, True])
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_an_export_that_is_told_to_end_leaves_nothing(
+    complete, tmp_path, name, swallowed
+):
+    """It left a hidden part, which SIGINT took away."""
+    program, out = TOLD_TO_END.format(name=name, swallowed=swallowed), tmp_path / "out"
+    asked = ("export", complete, "--to", "csv", "--out", out)
+    done = subprocess.run(
+        [sys.executable, "-c", program, *asked],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 128 + getattr(signal, name), done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(out.iterdir()) == []

@@ -192,6 +192,20 @@ def test_one_damaged_entry_of_the_ledger_does_not_end_it(killed_run):
     assert recover(path).samples >= acknowledged - 1024
 
 
+def test_a_recovery_that_is_told_to_end_leaves_the_run_as_it_was(killed_run):
+    """A copy as large as the run stayed beside it."""
+    path, acknowledged = killed_run()
+    before = {file.name for file in path.iterdir()}
+
+    def end(done):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        recover(path, end)
+    assert {file.name for file in path.iterdir()} == before
+    assert recover(path).samples >= acknowledged - 1024
+
+
 def test_a_living_run_is_left_alone(bench, recorder, folder):
     bench.play(recorder, bench.codes(5000), 500)
     with pytest.raises(RunFolderError, match="still being recorded"):
