@@ -15,6 +15,7 @@ from tactile_lab.store.export.content import (
     tables,
     unit,
 )
+from tactile_lab.store.export.hdf5 import writing
 from tactile_lab.store.export.library import library
 from tactile_lab.store.progress import Progress, nothing
 from tactile_lab.store.run import Run
@@ -67,12 +68,13 @@ def export(
     selection.check(run)
     with (
         replacing(file, size(run, selection)) as part,
-        h5netcdf.File(part, "w") as out,
+        writing(part, progress) as (disk, told),
+        h5netcdf.File(disk, "w") as out,
     ):
         out.attrs["Conventions"] = "CF-1.11"
         out.attrs.update(about(run, selection))
         if selection.rows(run):
-            _signals(out, run, selection, progress)
+            _signals(out, run, selection, told)
         for name, table in tables(run, selection).items():
             group = out.create_group(name)
             group.dimensions = {"row": len(table)}

@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
@@ -20,6 +21,7 @@ from tactile_lab.store.export.content import (
     changes,
     tables,
 )
+from tactile_lab.store.export.hdf5 import writing
 from tactile_lab.store.export.library import library
 from tactile_lab.store.folder import ZERO
 from tactile_lab.store.progress import Progress, nothing
@@ -95,6 +97,19 @@ def export(
     if selection.rate is not None:
         raise RunFolderError("NWB holds the samples as stored; leave out --rate.")
     selection.check(run)
+    with (
+        replacing(file, size(run, selection)) as part,
+        writing(part, progress) as (disk, told),
+        h5py.File(disk, "w") as out,
+        pynwb.NWBHDF5IO(file=out, mode="w") as writer,
+    ):
+        writer.write(_filled(pynwb, run, selection, told))
+    progress(1.0)
+    return [file]
+
+
+def _filled(pynwb: Any, run: Run, selection: Selection, progress: Progress) -> Any:
+    """A session that holds the part; its samples are read as it is written."""
     session = _session(pynwb, run, about(run, selection))
     _add_signals(pynwb, session, run, selection, progress)
     _add_derived(pynwb, session, run, selection)
@@ -108,13 +123,7 @@ def export(
         )
     if run.detection is not None:
         _add_spikes(pynwb, session, run, selection, run.detection)
-    with (
-        replacing(file, size(run, selection)) as part,
-        pynwb.NWBHDF5IO(str(part), "w") as writer,
-    ):
-        writer.write(session)
-    progress(1.0)
-    return [file]
+    return session
 
 
 def _add_spikes(
