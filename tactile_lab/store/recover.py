@@ -82,7 +82,8 @@ def recover(path: Path, progress: Progress = nothing) -> Recovered:
     if is_live(path):
         raise RunFolderError(f"{path} is still being recorded; wait until it ends.")
     info = read_info(path)
-    if info["status"] != "running":
+    # the ledger outlives a run whose record failed, of which nobody was killed
+    if info["status"] != "running" and not (path / LEDGER).exists():
         raise RunFolderError(
             f"{path} was not cut short (status {info['status']}); nothing to recover. "
             "`tactile-lab verify` checks it."

@@ -15,6 +15,7 @@ from tactile_lab.errors import RecordingError
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.store.recorder import Recorder
+from tactile_lab.store.recover import recover
 from tactile_lab.store.run import Run
 from tactile_lab.store.verify import verify
 
@@ -146,7 +147,7 @@ try:
 except RecordingError as error:
     print(error)
     try:
-        recorder.close("faulted", 500_000)
+        recorder.close("faulted", 500_000, reason=str(error))
     except RecordingError:
         pass
 """
@@ -165,6 +166,12 @@ except RecordingError as error:
         np.testing.assert_array_equal(
             run.signal("V_C1").scope_codes(0, run.samples), made[0, : run.samples]
         )
+    # as the message says; it was refused, and the file stayed damaged
+    found = recover(path)
+    assert found.samples > 50_000 and verify(path).sound
+    with Run.load(path) as run:
+        assert (run.status, run.samples) == ("recovered", found.samples)
+        assert "File too large" in run.info["reason"]
 
 
 def test_an_unwritable_place_is_refused(tmp_path):
