@@ -14,6 +14,7 @@ from tactile_lab.commands.options import json_option, run_argument
 from tactile_lab.commands.terminal import fail, print_json, progress, reading, say
 from tactile_lab.errors import ParameterError
 from tactile_lab.neuro.formats import FORMATS, SPIKES, of_whole_run, write
+from tactile_lab.trust import INFO
 
 if TYPE_CHECKING:
     from tactile_lab.store.selection import Selection
@@ -91,6 +92,7 @@ def command(
 
 
 def _of_run(run: Path, form: str, out: Path | None, selection: Selection) -> list[Path]:
+    _refuse_study(run)
     from tactile_lab.neuro.of_run import events_of
     from tactile_lab.quantity import bytes_text
     from tactile_lab.store.folder import refuse_own
@@ -120,6 +122,23 @@ def _of_run(run: Path, form: str, out: Path | None, selection: Selection) -> lis
         with progress(text) as update:
             written: list[Path] = module.export(loaded, target, selection, update)
     return written
+
+
+def _refuse_study(folder: Path) -> None:
+    """Say where a study has its numbers: it exports nothing itself."""
+    if (folder / INFO).exists() or not folder.is_dir():
+        return
+    from tactile_lab.studies.dataset import DATA
+    from tactile_lab.studies.points import RUNS
+
+    data, runs = folder / DATA, list((folder / RUNS).glob(f"*/{INFO}"))
+    if not data.exists() or runs:  # a run is asked for by its own refusal
+        return
+    raise ParameterError(
+        f"{folder} is a study, and its numbers are in open files already: {DATA} "
+        "(xarray.open_zarr) and results.json. It kept no run that could be exported; "
+        'with on = "simulated" and runs = true in its file it keeps one of each point.'
+    )
 
 
 def _of_skin(

@@ -40,6 +40,9 @@ OWN = frozenset(
 )
 """Files that a run is made of: nothing makes them again."""
 
+NAMED = 3
+"""Runs that a refusal names of those there are."""
+
 RESERVE = 200_000_000
 """Bytes that must stay free on the disk while a run is written."""
 
@@ -214,8 +217,7 @@ def read_info(path: Path) -> dict[str, Any]:
     except (FileNotFoundError, NotADirectoryError) as error:
         what = f"it has no {INFO}" if path.is_dir() else "it is no folder"
         raise RunFolderError(
-            f"{path} is no run folder: {what}. Give the folder of one run; "
-            "`tactile-lab runs` lists them."
+            f"{path} is no run folder: {what}. {_give_one(path)}"
         ) from error
     except (OSError, ValueError) as error:
         raise RunFolderError(f"{file} cannot be read: {error}.") from error
@@ -225,6 +227,17 @@ def read_info(path: Path) -> dict[str, Any]:
             f"{file} has schema {found}; this version reads schema {SCHEMA}."
         )
     return info
+
+
+def _give_one(path: Path) -> str:
+    """What to give instead of a folder that is no run's, but may hold some."""
+    inside = sorted(file.parent for file in path.glob(f"*/{INFO}"))
+    inside = inside or sorted(file.parent for file in path.glob(f"*/*/{INFO}"))
+    if not inside:
+        return "Give the folder of one run; `tactile-lab runs` lists them."
+    names = ", ".join(str(run) for run in inside[:NAMED])
+    more = f" and {len(inside) - NAMED} more" if len(inside) > NAMED else ""
+    return f"Give one of the runs in it: {names}{more}."
 
 
 def has_lost_data(path: Path, info: Mapping[str, Any]) -> bool:

@@ -61,6 +61,23 @@ def test_a_run_killed_before_its_first_sample_did_not_end(tactile_lab, tmp_path)
     assert "was cut short before the first sample" in answer.err
 
 
+def test_a_folder_of_runs_is_refused_with_their_names(tactile_lab, tmp_path):
+    """Only that it is none was told, and of a study nothing of its data."""
+    study = tmp_path / "study"
+    (study / "data.zarr").mkdir(parents=True)
+    answer = tactile_lab("export", study, "--to", "csv")
+    assert answer.code == 2
+    assert "is a study" in answer.err and "xarray.open_zarr" in answer.err
+    runs = [RunFolder.create(study / "runs", f"point-{n}", {}) for n in range(5)]
+    for run in runs:
+        run.finish("complete")
+    names = sorted(str(run.path) for run in runs)
+    for asked in (study, study / "runs"):
+        answer = tactile_lab("export", asked, "--to", "csv")
+        assert answer.code == 2
+        assert f"one of the runs in it: {', '.join(names[:3])} and 2 more" in answer.err
+
+
 @pytest.mark.parametrize("verb", ["show", "recover", "report"])
 def test_a_file_in_place_of_a_run_is_no_damage(tactile_lab, empty_run, verb):
     answer = tactile_lab(verb, empty_run / INFO)
