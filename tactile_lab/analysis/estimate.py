@@ -47,16 +47,15 @@ class Estimate:
         return (self.high - self.low) / 2
 
     def text(self, unit: str, factor: float = 1.0) -> str:
-        """For a person: "3.1 s (2.9 to 3.3 s, 95 %)"; `factor`: from SI to `unit`.
+        """For a person: "3.10 s (2.90 to 3.30 s, 95 %)"; `factor`: from SI to `unit`.
 
-        Three digits, or as many more as tell the interval's ends apart.
+        All three end at one digit: the third, or the one that tells the ends apart.
         """
-        digits = 3
-        if self.half > 0 and self.value:
-            whole = math.floor(math.log10(abs(self.value))) + 1
-            digits = max(3, math.ceil(whole - math.log10(self.half)))
+        half = self.half * abs(factor)
+        first = _power(max(abs(self.value * factor), half))
+        last = min(first - 2, _power(half)) if half else first - 2
         value, low, high = (
-            printed(f"{number * factor:.{digits}g}")
+            printed(_ending(number * factor, last, first))
             for number in (self.value, self.low, self.high)
         )
         behind = f" {unit}".rstrip()
@@ -107,6 +106,22 @@ class Estimate:
             "low_95": self.low,
             "high_95": self.high,
         }
+
+
+WRITTEN_OUT = range(-5, 7)
+"""Powers of ten of the first digit of numbers that are shown without an exponent."""
+
+
+def _power(size: float) -> int:
+    """Of ten, of the first digit of `size` as it is printed."""
+    return int(f"{size:.2e}".partition("e")[2])
+
+
+def _ending(number: float, last: int, first: int) -> str:
+    """A number down to the digit of 10^last, of a size about 10^first."""
+    if first not in WRITTEN_OUT:
+        return f"{number:.{first - last}e}"
+    return f"{round(number, -last) + 0.0:.{max(-last, 0)}f}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,16 +10,20 @@ from tactile_lab.analysis.estimate import Estimate
 @pytest.mark.parametrize(
     ("value", "half", "text"),
     [
-        (3.1, 0.2, "3.1 s (2.9 to 3.3 s, 95 %)"),
+        (3.1, 0.2, "3.10 s (2.90 to 3.30 s, 95 %)"),
         (8.6923, 0.03, "8.69 s (8.66 to 8.72 s, 95 %)"),
-        (8.69, 0.001, "8.69 s (8.689 to 8.691 s, 95 %)"),
-        (1.4, 0.0033, "1.4 s (1.397 to 1.403 s, 95 %)"),
-        (1.4, 4e-5, "1.4 s (1.39996 to 1.40004 s, 95 %)"),
-        (-2e-3, 1e-3, "−0.002 s (−0.003 to −0.001 s, 95 %)"),
-        (0.0, 0.5, "0 s (−0.5 to 0.5 s, 95 %)"),
+        (11.0, 0.5, "11.0 s (10.5 to 11.5 s, 95 %)"),
+        (9.98, 0.42, "9.98 s (9.56 to 10.40 s, 95 %)"),
+        (12345.0, 200.0, "12300 s (12100 to 12500 s, 95 %)"),
+        (1.3e-9, 1e-10, "1.30e−09 s (1.20e−09 to 1.40e−09 s, 95 %)"),
+        (8.69, 0.001, "8.690 s (8.689 to 8.691 s, 95 %)"),
+        (1.4, 0.0033, "1.400 s (1.397 to 1.403 s, 95 %)"),
+        (1.4, 4e-5, "1.40000 s (1.39996 to 1.40004 s, 95 %)"),
+        (-2e-3, 1e-3, "−0.00200 s (−0.00300 to −0.00100 s, 95 %)"),
+        (0.0, 0.5, "0.000 s (−0.500 to 0.500 s, 95 %)"),
     ],
 )
-def test_the_ends_of_an_interval_are_told_apart(value, half, text):
+def test_a_value_and_the_ends_of_its_interval_end_at_one_digit(value, half, text):
     assert Estimate(value, half / 2, value - half, value + half).text("s") == text
 
 
@@ -27,7 +31,7 @@ def test_the_ends_of_an_interval_are_told_apart(value, half, text):
     ("value", "half", "unit", "text"),
     [
         (65.3e-12, 2e-12, "A", "65.3 pA (63.3 to 67.3 pA, 95 %)"),
-        (0.039, 1e-3, "V m/N", "0.039 V m/N (0.038 to 0.04 V m/N, 95 %)"),
+        (0.039, 1e-3, "V m/N", "0.0390 V m/N (0.0380 to 0.0400 V m/N, 95 %)"),
         (1.02, 0.01, "", "1.02 (1.01 to 1.03, 95 %)"),
     ],
 )
