@@ -110,3 +110,16 @@ def test_a_lead_has_points_where_it_bends_and_nowhere_else():
     given, _ = lag.follow(lead)
     at = np.linspace(1, 99, 5000)
     assert given.at(at) == pytest.approx(slow.at(at), abs=1e-6)
+
+
+@pytest.mark.parametrize("step", [1.0, 0.1, 0.02])
+@pytest.mark.parametrize(
+    "lag", [Lag(1.1e-3, 3e-3), Lag(3e-3, 1.1e-3), Lag(0, 3e-3), Lag(1.1e-3, 0)]
+)
+def test_a_step_comes_no_later_than_its_lags(lag, step):
+    """By the area: chords alone let one of 2 % of the peak come 15 us late."""
+    wave = Waveform.through([(0, 1 - step), (0.1, 1 - step), (0.1, 1.0), (0.5, 1.0)])
+    found, _ = lag.follow(wave)
+    since = found.time >= 0.1
+    missing = np.trapezoid(1 - found.value[since], found.time[since]) / step
+    assert abs(missing - lag.coil - lag.eddy) < lag.drawn / 10

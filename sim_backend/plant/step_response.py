@@ -16,9 +16,11 @@ import numpy as np
 
 from sim_backend.plant.pieces import Pieces
 from tactile_lab.arrays import FloatArray
+from tactile_lab.lag import evening, excess
 
-ACCURACY = 1e-4
-"""Largest deviation of the linear pieces from the exponentials, per step."""
+ACCURACY = 2e-5
+"""Largest deviation of the linear pieces from the exponentials, per step. Five times as
+much is half of the half-width to which `identify` tells tau from short presses."""
 PLAYS = 8
 """Play operators that share the core's hysteresis."""
 
@@ -88,11 +90,14 @@ class Core:
         jump = begin.target - begin.current
         current = begin.target - jump * _decay(self._current_knots, self._coil)
         current[-1] = begin.target
+        current -= jump * _evening(self._current_knots, (1.0, self._coil))
         times, values = [], []
         for moment, end in self._stretches(begin):
             held, fast, slow = self._terms(moment)
             value = self._value(self._field_knots, held, fast, slow)
             value[-1] = held
+            parts = (fast, self._coil), (slow, self._eddy)
+            value += _evening(self._field_knots, *parts)
             inside = moment.time + self._field_knots < end
             times.append(moment.time + self._field_knots[inside])
             values.append(value[inside])
@@ -178,6 +183,13 @@ def lag_knots(coil: float, eddy: float = 0.0) -> FloatArray:
     )
     knots = np.linspace(0, count[-1], math.ceil(count[-1]) + 1)
     return np.asarray(np.interp(knots, count, time))
+
+
+def _evening(knots: FloatArray, *decays: tuple[float, float]) -> FloatArray:
+    """What to add at the knots that chords of decays, size and lag, come no later."""
+    lasts = np.diff(knots)
+    beyond = [excess(knots[:-1], lasts, size, lag) for size, lag in decays]
+    return evening(lasts, np.sum(beyond, axis=0))
 
 
 def _decay(since: FloatArray, lag: float) -> FloatArray:

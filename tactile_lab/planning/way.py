@@ -26,7 +26,7 @@ from tactile_lab.instruments.registry import (
     scope_capability,
 )
 from tactile_lab.instruments.serial_dialect import MARGIN
-from tactile_lab.lag import Lag
+from tactile_lab.lag import FINE, Lag
 from tactile_lab.magnetics import Magnet
 from tactile_lab.planning.current import cut, limited, slewed, wanted_current
 from tactile_lab.quantity import show
@@ -77,7 +77,8 @@ def drive_for(
     way, enough = scene.coil.way, scene.force_accuracy
     if asked is None or asked.peak == 0 or way == "set-points":
         return steps
-    near = enough * float(np.ptp(np.append(asked.value, 0.0)))
+    # as far as straight pieces tell an answer to a step
+    near = (1 + FINE) * enough * float(np.ptp(np.append(asked.value, 0.0)))
     found, reasons = [steps], []
     for name, can in (("generator", _generated), ("list", _lists)):
         if way not in ("auto", name):
