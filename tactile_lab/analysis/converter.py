@@ -45,7 +45,7 @@ def step_bias(
         return 0.0
     if bins.size < 3:
         return code / 2
-    if extent is not None and np.median(extent) < TOGGLING * code:
+    if extent is not None and np.median(np.asarray(extent)) < TOGGLING * code:
         return code / 2
     # of second differences, so that a slope is no noise; the median, so that no edge is
     apart = np.abs(bins[2:] - 2 * bins[1:-1] + bins[:-2]) / math.sqrt(6)
