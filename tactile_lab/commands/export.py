@@ -19,6 +19,8 @@ from tactile_lab.trust import INFO
 if TYPE_CHECKING:
     from tactile_lab.store.selection import Selection
 
+BOUNDED = ("nwb", "parquet")
+"""Formats that tell what they take at most: compression leaves less of most runs."""
 LARGE = 100_000_000
 """Bytes that are announced beforehand wherever the output goes."""
 
@@ -116,7 +118,8 @@ def _of_run(run: Path, form: str, out: Path | None, selection: Selection) -> lis
                     sys.stderr,
                 )
         size = module.size(loaded, selection)
-        text = f"writing {target.name}, about {bytes_text(size)}"
+        most = "up to" if form in BOUNDED else "about"
+        text = f"writing {target.name}, {most} {bytes_text(size)}"
         if size >= LARGE:
             say(text, sys.stderr)
         with progress(text) as update:
