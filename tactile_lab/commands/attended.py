@@ -7,14 +7,14 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, suppress
 from types import FrameType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from tactile_lab.commands.terminal import ENDING, warn
+from tactile_lab.commands.terminal import ENDING, minded, warn
 
 if TYPE_CHECKING:
     from tactile_lab.acquisition.ending import Ending
@@ -69,8 +69,8 @@ class Signals:
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Signals:
-        names = (*ENDING, *self.acts)
-        numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+        acts = [getattr(signal, name) for name in self.acts if hasattr(signal, name)]
+        numbers = (*ENDING, *acts)
         self._before = {n: signal.signal(n, self._note) for n in numbers}
         return self
 
@@ -108,16 +108,9 @@ class Signals:
             os.write(2, STARTING)
 
 
-@contextmanager
-def interrupted() -> Iterator[None]:
+def interrupted() -> AbstractContextManager[None]:
     """Within, each signal that ends a program raises KeyboardInterrupt."""
-    numbers = [getattr(signal, n) for n in ENDING if hasattr(signal, n)]
-    before = {n: signal.signal(n, signal.default_int_handler) for n in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    return minded(dict.fromkeys(ENDING, signal.default_int_handler))
 
 
 def run_attended(

@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn, TextIO
@@ -29,8 +29,12 @@ SHOWN = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160))}
 del SHOWN[ord("\t")], SHOWN[ord("\n")]
 LINE_EVERY = 0.1
 """Part of the whole after which progress writes a line where it is piped."""
-ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
-"""Signals that end a program."""
+ENDING = tuple(
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+    if hasattr(signal, name)
+)
+"""Signals that end a program, of those that this system has."""
 
 PATIENCE = 10.0
 """Seconds that piped work may take unmentioned."""
@@ -197,18 +201,21 @@ def leave(number: int, _: FrameType | None) -> NoReturn:
 
 
 @contextmanager
-def leaving_tidily() -> Iterator[None]:
-    """Within, SIGTERM and SIGHUP let what is being written be cleared away first."""
-    ours = threading.current_thread() is threading.main_thread()
-    numbers = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
-    unminded = [n for n in numbers if ours and signal.getsignal(n) == signal.SIG_DFL]
-    for number in unminded:
-        signal.signal(number, leave)
+def minded(handlers: Mapping[int, Any]) -> Iterator[None]:
+    """Within, signals are handled so, and as before after it; of the main thread."""
+    before = {n: signal.signal(n, handler) for n, handler in handlers.items()}
     try:
         yield
     finally:
-        for number in unminded:
-            signal.signal(number, signal.SIG_DFL)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def leaving_tidily() -> AbstractContextManager[None]:
+    """Within, SIGTERM and SIGHUP let what is being written be cleared away first."""
+    ours = threading.current_thread() is threading.main_thread()
+    unminded = (n for n in ENDING if ours and signal.getsignal(n) == signal.SIG_DFL)
+    return minded(dict.fromkeys(unminded, leave))
 
 
 @contextmanager
@@ -217,10 +224,9 @@ def _noting_endings() -> Iterator[Callable[[], None]]:
     heard: list[int] = []
     # another thread sets no handler, and one of another kind minds them itself
     ours = threading.current_thread() is threading.main_thread()
-    numbers = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
     handlers: dict[int, Callable[[int, FrameType | None], Any]] = {
         number: handler
-        for number in (numbers if ours else ())
+        for number in (ENDING if ours else ())
         if callable(handler := signal.getsignal(number))
         and handler in (signal.default_int_handler, leave)
     }
@@ -233,13 +239,8 @@ def _noting_endings() -> Iterator[Callable[[], None]]:
         if heard:
             handlers[heard[0]](heard[0], None)
 
-    for number in handlers:
-        signal.signal(number, note)
-    try:
+    with minded(dict.fromkeys(handlers, note)):
         yield look
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
 
 
 class StatusLine:
