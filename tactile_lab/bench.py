@@ -7,14 +7,13 @@ SI.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Protocol
 
 from tactile_lab.clock import Clock
 from tactile_lab.current_list import CurrentList, ListCapability
-from tactile_lab.follower import IDEAL, Follower
+from tactile_lab.follower import Follower
 from tactile_lab.generator import AnalogueInput, Generator
 from tactile_lab.quantity import Unit, show
 from tactile_lab.scope import Scope
@@ -84,9 +83,7 @@ class Followers(SceneTable):
     @property
     def speed(self) -> Follower:
         """Pole and slew; ideal where they are infinitely fast."""
-        if self.bandwidth == 0:
-            return IDEAL
-        return Follower(1 / (2 * math.pi * self.bandwidth), self.slew)
+        return Follower.of(self.bandwidth, self.slew)
 
 
 @dataclass(frozen=True)

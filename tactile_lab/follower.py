@@ -62,6 +62,11 @@ class Follower:
     pole: float
     slew: float
 
+    @classmethod
+    def of(cls, bandwidth: float, slew: float) -> Follower:
+        """By its bandwidth, Hz, 0 for an ideal one, and slew rate, V/s."""
+        return cls(1 / (2 * math.pi * bandwidth), slew) if bandwidth else IDEAL
+
     def spike(self, amplitude: float, decay: float) -> Pulse | None:
         """Output for an input that jumps to `amplitude` V and decays with `decay` s."""
         return _spike(self, amplitude, decay) if decay > 0 else None

@@ -116,9 +116,7 @@ class PlantOptions:
     @property
     def speed(self) -> Follower:
         """Pole and slew of the voltage followers."""
-        if not self.follower:
-            return Follower(0.0, math.inf)
-        return Follower(1 / (2 * math.pi * self.follower_pole), self.slew)
+        return Follower.of(self.follower * self.follower_pole, self.slew)
 
     def warmer(self, time: float) -> float:
         """By how much the sensor is warmer at `time` s than at 0 s, K."""
