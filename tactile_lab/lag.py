@@ -99,7 +99,7 @@ class Lag:
         slope = (to - u) / lasts
         line = u - slope * (fast + slow)
         straight = to - slope * fast, to - slope * (fast + slow)
-        left = _left(lasts, fast), _left(lasts, slow)
+        left = decay(lasts, fast), decay(lasts, slow)
         decays, ends, after = self._decays(
             before, (u - slope * fast, line), straight, left, fine / 100
         )
@@ -117,7 +117,7 @@ class Lag:
         since = between - start[piece]
         value = line[piece] + slope[piece] * since
         for sizes, lag in zip(decays, (fast, slow), strict=True):
-            value += sizes[piece] * _left(since, lag)
+            value += sizes[piece] * decay(since, lag)
         times = np.concatenate([times, between])
         order = np.argsort(times)
         times, value = times[order], np.concatenate([known, value])[order]
@@ -240,8 +240,8 @@ def excess(
         size: of the decay as it began.
         lag: s.
     """
-    begin = size * _left(since, lag)
-    end = begin * _left(lasts, lag)
+    begin = size * decay(since, lag)
+    end = begin * decay(lasts, lag)
     return np.asarray(lasts * (begin + end) / 2 - lag * (begin - end))
 
 
@@ -271,8 +271,8 @@ def _joined(parts: list[FloatArray]) -> FloatArray:
     return whole
 
 
-def _left(since: FloatArray, lag: float) -> FloatArray:
-    """What `since` s leave of a lag's decay."""
+def decay(since: FloatArray, lag: float) -> FloatArray:
+    """exp(-since/lag), what `since` s leave of a lag; nothing of one of 0 s."""
     return np.exp(-since / lag) if lag > 0 else np.zeros(since.size)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from sim_backend.plant.pieces import Pieces
 from tactile_lab.arrays import FloatArray
-from tactile_lab.lag import evening, excess
+from tactile_lab.lag import decay, evening, excess
 
 ACCURACY = 2e-5
 """Largest deviation of the linear pieces from the exponentials, per step. Five times as
@@ -88,7 +88,7 @@ class Core:
     def answer(self, begin: Moment) -> StepResponse:
         """Coil current and effective current from `begin` on."""
         jump = begin.target - begin.current
-        current = begin.target - jump * _decay(self._current_knots, self._coil)
+        current = begin.target - jump * decay(self._current_knots, self._coil)
         current[-1] = begin.target
         current -= jump * _evening(self._current_knots, (1.0, self._coil))
         times, values = [], []
@@ -150,9 +150,7 @@ class Core:
     def _value(
         self, since: FloatArray, held: float, fast: float, slow: float
     ) -> FloatArray:
-        return (
-            held + fast * _decay(since, self._coil) + slow * _decay(since, self._eddy)
-        )
+        return held + fast * decay(since, self._coil) + slow * decay(since, self._eddy)
 
 
 def lag_knots(coil: float, eddy: float = 0.0) -> FloatArray:
@@ -174,8 +172,8 @@ def lag_knots(coil: float, eddy: float = 0.0) -> FloatArray:
     if coil == 0 or eddy == 0:
         bend = 1.25 * np.exp(-time / slowest) / slowest**2
     else:
-        fast = _decay(time, coil) / (coil * (eddy - coil))
-        slow = _decay(time, eddy) / (eddy * (eddy - coil))
+        fast = decay(time, coil) / (coil * (eddy - coil))
+        slow = decay(time, eddy) / (eddy * (eddy - coil))
         bend = np.maximum(np.abs(fast - slow), np.abs(fast - 1.25 * slow))
     density = np.sqrt(bend / (8 * ACCURACY))
     count = np.concatenate(
@@ -190,8 +188,3 @@ def _evening(knots: FloatArray, *decays: tuple[float, float]) -> FloatArray:
     lasts = np.diff(knots)
     beyond = [excess(knots[:-1], lasts, size, lag) for size, lag in decays]
     return evening(lasts, np.sum(beyond, axis=0))
-
-
-def _decay(since: FloatArray, lag: float) -> FloatArray:
-    """exp(-since/lag); nothing remains of a lag of 0."""
-    return np.exp(-since / lag) if lag > 0 else np.zeros(since.size)

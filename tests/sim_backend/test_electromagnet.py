@@ -32,7 +32,7 @@ def exact(commands: list[tuple[float, float]], times: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("spacing", "part"), [(0.1, 1), (21e-3, 1.05), (5e-3, 2)])
-def test_pieces_stay_within_a_ten_thousandth_of_the_step(
+def test_pieces_stay_as_near_to_the_step_as_promised(
     spacing: float, part: float
 ) -> None:
     commands = [(k * spacing, 0.1 * (k + 1)) for k in range(4)]
