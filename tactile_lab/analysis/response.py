@@ -99,32 +99,19 @@ def gain(
     if leak is not None:
         drift.append(np.exp((t[0] - t) / leak))
     lines: list[FloatArray] = []
-    while True:
+    for _ in range(MOST_LINES + 1):
         design = np.column_stack([*waves, *drift, *lines])
         inverse = np.linalg.pinv(design)
-        into, out = inverse @ given_by, inverse @ answered
-        given, got = complex(into[0], into[1]), complex(out[0], out[1])
-        if abs(given) < 1e-12:
-            raise NotIdentifiableError(f"there is no cause at {frequency:g} Hz")
-        left = answered - design @ out
-        beside: list[FloatArray] = []
-        # what the cause does beside its sine, such as a source's steps, is no scatter:
-        # the answer follows it, a little late
-        steps = given_by - design @ into
-        if np.abs(steps).max() > 1e-9 * abs(given):
-            beside += [steps, np.gradient(steps)]
-        if code:
-            turn = 2 * np.pi * (design @ out) / code
-            beside += [np.sin(turn), np.cos(turn)]
-        if beside:
-            known = np.column_stack(beside)
-            known -= design @ (inverse @ known)
-            left -= known @ (np.linalg.pinv(known) @ left)
+        left, beside = _left_over(design, inverse, given_by, answered, code)
         found = _line(left, above=(HARMONICS + 1) * cycles)
-        if not found or len(lines) >= MOST_LINES * len(found):
+        if not found:
             break
         lines += found
-    freedom = t.size - design.shape[1] - len(beside)
+    into, out = inverse @ given_by, inverse @ answered
+    given, got = complex(into[0], into[1]), complex(out[0], out[1])
+    if abs(given) < 1e-12:
+        raise NotIdentifiableError(f"there is no cause at {frequency:g} Hz")
+    freedom = t.size - design.shape[1] - beside
     alike = correlated(left)
     scatter = math.sqrt(float(np.sum(left**2)) / max(freedom, 1))
     size = max(abs(got), 1e-300)
@@ -157,6 +144,40 @@ def _begun(time: FloatArray, cause: FloatArray, frequency: float) -> int:
     usual = float(np.sqrt(np.mean(away[half:] ** 2)))
     not_yet = np.flatnonzero(away[:half] > NOT_YET * usual + 1e-9 * np.ptp(cause))
     return int(not_yet[-1]) + 1 if not_yet.size else 0
+
+
+def _left_over(
+    design: FloatArray,
+    inverse: FloatArray,
+    cause: FloatArray,
+    answer: FloatArray,
+    code: float | None,
+) -> tuple[FloatArray, int]:
+    """What the sine and all that is known leave of an answer; columns beside `design`.
+
+    Args:
+        design: what is fitted, shape (n, columns), sine and cosine first.
+        inverse: of it.
+        cause: shape (n,).
+        answer: shape (n,).
+        code: as `gain` takes it.
+    """
+    into, out = inverse @ cause, inverse @ answer
+    left = answer - design @ out
+    beside: list[FloatArray] = []
+    # what the cause does beside its sine, such as a source's steps, is no scatter: the
+    # answer follows it, a little late
+    steps = cause - design @ into
+    if np.abs(steps).max() > 1e-9 * math.hypot(into[0], into[1]):
+        beside += [steps, np.gradient(steps)]
+    if code:
+        turn = 2 * np.pi * (design @ out) / code
+        beside += [np.sin(turn), np.cos(turn)]
+    if beside:
+        known = np.column_stack(beside)
+        known -= design @ (inverse @ known)
+        left -= known @ (np.linalg.pinv(known) @ left)
+    return left, len(beside)
 
 
 def _line(left: FloatArray, above: float) -> list[FloatArray]:
