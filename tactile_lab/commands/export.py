@@ -19,8 +19,6 @@ from tactile_lab.trust import INFO
 if TYPE_CHECKING:
     from tactile_lab.store.selection import Selection
 
-BOUNDED = ("nwb", "parquet")
-"""Formats that tell what they take at most: compression leaves less of most runs."""
 LARGE = 100_000_000
 """Bytes that are announced beforehand wherever the output goes."""
 
@@ -118,7 +116,7 @@ def _of_run(run: Path, form: str, out: Path | None, selection: Selection) -> lis
                     sys.stderr,
                 )
         size = module.size(loaded, selection)
-        most = "up to" if form in BOUNDED else "about"
+        most = "up to" if FORMATS[form].bounded else "about"
         text = f"writing {target.name}, {most} {bytes_text(size)}"
         if size >= LARGE:
             say(text, sys.stderr)
