@@ -255,12 +255,10 @@ class Execution(Task[Executed]):
     def _begin_record(self, stream: Stream | None) -> Recorder:
         """Start the record; codes can be scaled from now on."""
         assert self._runner is not None
-        read_back = self._runner.instruments.settings
         now = self.bench.clock.now()
         self.folder.begin(
             0.0 if stream is None else now - stream.started,
-            instruments=read_back,
-            temperature=temperature(self.scene, read_back),
+            **self._read_back(self._runner),
         )
         self._recorder = Recorder(
             self.folder,
@@ -268,6 +266,11 @@ class Execution(Task[Executed]):
             when_full="wait" if self.bench.clock.simulated else "error",
         )
         return self._recorder
+
+    def _read_back(self, runner: Runner) -> dict[str, Any]:
+        """What the instruments said of themselves, and how warm the sensor was."""
+        said = runner.instruments.settings
+        return {"temperature": temperature(self.scene, said), "instruments": said}
 
     def _close(self, runner: Runner, ending: Ending, took: float) -> Certificate | None:
         """Complete the record and say in it how the run ended, which may fail, too."""
@@ -279,8 +282,7 @@ class Execution(Task[Executed]):
             "coil_verified_off": ending.off.verified,
             "duration_s": runner.duration,
             "took_s": took,
-            "temperature": temperature(self.scene, instruments.settings),
-            "instruments": instruments.settings,
+            **self._read_back(runner),
             "instruments_after": instruments.settings_after,
             "instruments_changed": instruments.changes,
             "accuracy": self.bench.accuracy() if self.bench.accuracy else "",
