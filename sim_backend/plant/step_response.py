@@ -18,9 +18,13 @@ from sim_backend.plant.pieces import Pieces
 from tactile_lab.arrays import FloatArray
 from tactile_lab.lag import decay, evening, excess
 
-ACCURACY = 2e-5
-"""Largest deviation of the linear pieces from the exponentials, per step. Five times as
-much is half of the half-width to which `identify` tells tau from short presses."""
+ACCURACY = 1e-4
+"""Largest deviation of the linear pieces from the exponentials, per step."""
+OVER = 1e-6
+"""Part of a step at which its answer is over. Of short presses, one that was over at
+5e-5 put tau off by half of the half-width to which `identify` tells it."""
+LONGEST = 0.75
+"""Length of a piece at most, in lags, however little of the step is left."""
 PLAYS = 8
 """Play operators that share the core's hysteresis."""
 
@@ -158,7 +162,7 @@ def lag_knots(coil: float, eddy: float = 0.0) -> FloatArray:
 
     A chord of length l deviates by l^2 |f''|/8, so knots are spaced such that each
     chord deviates by `ACCURACY` of the step, also while a quarter of such a step is
-    still under way.
+    still under way, and no farther apart than `LONGEST` until it is `OVER`.
 
     Args:
         coil: first lag, s.
@@ -167,7 +171,7 @@ def lag_knots(coil: float, eddy: float = 0.0) -> FloatArray:
     slowest = max(coil, eddy)
     if slowest == 0:
         return np.zeros(1)
-    end = -math.log(ACCURACY / 2) * slowest
+    end = -math.log(OVER) * slowest
     time = np.concatenate([np.zeros(1), np.geomspace(slowest * 1e-4, end, 4000)])
     if coil == 0 or eddy == 0:
         bend = 1.25 * np.exp(-time / slowest) / slowest**2
@@ -175,7 +179,7 @@ def lag_knots(coil: float, eddy: float = 0.0) -> FloatArray:
         fast = decay(time, coil) / (coil * (eddy - coil))
         slow = decay(time, eddy) / (eddy * (eddy - coil))
         bend = np.maximum(np.abs(fast - slow), np.abs(fast - 1.25 * slow))
-    density = np.sqrt(bend / (8 * ACCURACY))
+    density = np.maximum(np.sqrt(bend / (8 * ACCURACY)), 1 / (LONGEST * slowest))
     count = np.concatenate(
         [np.zeros(1), np.cumsum(np.diff(time) * (density[1:] + density[:-1]) / 2)]
     )

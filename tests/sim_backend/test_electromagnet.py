@@ -32,7 +32,7 @@ def exact(commands: list[tuple[float, float]], times: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("spacing", "part"), [(0.1, 1), (21e-3, 1.05), (5e-3, 2)])
-def test_pieces_stay_as_near_to_the_step_as_promised(
+def test_pieces_stay_within_a_ten_thousandth_of_the_step(
     spacing: float, part: float
 ) -> None:
     commands = [(k * spacing, 0.1 * (k + 1)) for k in range(4)]
@@ -50,11 +50,14 @@ def test_pieces_stay_as_near_to_the_step_as_promised(
 def test_a_few_knots_per_lag_are_enough() -> None:
     magnet = Electromagnet(coil_lag=COIL, eddy_lag=EDDY)
     magnet.command(0.0, 1.0)
-    assert magnet.effectives(0.0, 1.0).start.size < 200
+    assert magnet.effectives(0.0, 1.0).start.size < 100
 
 
 def test_pieces_come_no_later_than_the_field() -> None:
-    """By the area that they leave; chords alone came 0.9 us late."""
+    """By the area that they leave: chords alone came 0.9 us late.
+
+    Over with 5e-5 of the step left they came 0.3 us early.
+    """
     magnet = Electromagnet(coil_lag=COIL, eddy_lag=EDDY)
     magnet.command(0.0, 1.0)
     for found, lag in (
