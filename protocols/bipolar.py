@@ -57,7 +57,9 @@ class Bipolar(Levels):
     def conclude(self, run: Measurement) -> Conclusion:
         """What each force does to the drain current, and tau of the film."""
         if run.trace("I_DS") is None:
-            return Conclusion(missing=("No drain current: V_C1 was not recorded.",))
+            seen = run.trace("V_C1") is not None
+            why = "I_DS could not be derived" if seen else "V_C1 was not recorded"
+            return Conclusion(missing=(f"No drain current: {why}.",))
         pushed = [t for t in run.results if t.held is not None and t.level]
         held = [
             t

@@ -13,6 +13,8 @@ from tactile_lab.model.circuit import Circuit
 
 BOXCAR_3DB = 0.4429
 """-3 dB frequency of a mean over a window, times the window's length."""
+EVEN = 0.01
+"""Part of a step by which even steps may differ from their mean."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,7 @@ def drain_current(
             f"shapes {t.shape} and {v.shape}."
         )
     step = (t[-1] - t[0]) / (t.size - 1)
-    if step <= 0 or np.max(np.abs(np.diff(t) - step)) > 0.01 * step:
+    if step <= 0 or np.max(np.abs(np.diff(t) - step)) > EVEN * step:
         raise ParameterError(
             "I_DS from V_C1 needs evenly spaced, increasing times; split the trace at "
             "its gaps."
@@ -73,6 +75,26 @@ def drain_current(
     current = (parts.V_S - mean) / parts.R1 - mean / parts.R2 - parts.C1 * slope
     averaged = (2 * half + 1) * step
     return DrainCurrent(t, current, BOXCAR_3DB / averaged, averaged)
+
+
+def drain_currents(
+    time: FloatArray, V_C1: FloatArray, circuit: Circuit | None = None
+) -> list[DrainCurrent]:
+    """I_DS of each stretch of three points and more that are evenly spaced.
+
+    A trace is uneven where samples are missing, and beside that: the mean next to a
+    gap is of fewer samples.
+    """
+    steps = np.diff(time)
+    usual = np.median(steps) if steps.size else 0.0
+    # half of what their mean may differ by, which need not be the usual one
+    uneven = np.abs(steps - usual) > EVEN / 2 * usual
+    edges = np.flatnonzero(uneven) + 1
+    return [
+        drain_current(t, v, circuit)
+        for t, v in zip(np.split(time, edges), np.split(V_C1, edges), strict=True)
+        if t.size >= 3
+    ]
 
 
 def _sliding_line(

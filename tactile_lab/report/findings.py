@@ -8,15 +8,14 @@ import numpy as np
 
 from tactile_lab.analysis.carried_over import Begun, carried_over
 from tactile_lab.conclusion import Conclusion
-from tactile_lab.errors import TactileLabError
+from tactile_lab.errors import ParameterError, TactileLabError
 from tactile_lab.measurement import MeasuredTrial, RecordedSignal
-from tactile_lab.model.drain_current import drain_current
+from tactile_lab.model.drain_current import drain_currents
 from tactile_lab.plot import Plot
 from tactile_lab.quantity import show
 from tactile_lab.report.drift import drift_plot
 from tactile_lab.report.overview import overview
 from tactile_lab.report.run_data import RunData
-from tactile_lab.report.splice import stretches
 from tactile_lab.report.twin import BesideModel, twin_plot, with_twin
 from tactile_lab.stimulus.force import force_at_zero
 
@@ -195,17 +194,13 @@ def _uncounted(run: RunData) -> tuple[str, ...]:
 
 
 def _with_drain_current(run: RunData) -> tuple[RunData, tuple[str, ...]]:
-    """The run with I_DS derived piecewise from V_C1, gap by gap, and what to say."""
+    """The run with I_DS derived from V_C1, stretch by stretch, and what to say."""
     measured = run.trace("V_C1")
     if not run.asks_I_DS or run.trace("I_DS") is not None or measured is None:
         return run, ()
-    pieces = [
-        drain_current(measured.time[piece], measured.mean[piece], run.circuit)
-        for piece in stretches(measured.time)
-        if piece.stop - piece.start >= 3
-    ]
+    pieces = drain_currents(measured.time, measured.mean, run.circuit)
     if not pieces:
-        return run, ()
+        raise ParameterError("V_C1 has nowhere three points that are evenly spaced.")
     derived = RecordedSignal(
         signal="I_DS",
         time=np.concatenate([p.time for p in pieces]),

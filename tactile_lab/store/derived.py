@@ -8,7 +8,7 @@ import numpy as np
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.errors import RunFolderError
-from tactile_lab.model.drain_current import DrainCurrent, drain_current
+from tactile_lab.model.drain_current import DrainCurrent, drain_currents
 from tactile_lab.store.folder import SCENE
 from tactile_lab.store.signal import averages
 from tactile_lab.store.stored_run import StoredRun
@@ -82,14 +82,7 @@ def drain_current_of(run: StoredRun) -> DrainCurrent:
     pieces = list(averages([signal], spans, _window(run)))
     time = np.concatenate([times for times, _ in pieces] or [np.empty(0)])
     V_C1 = np.concatenate([means[0] for _, means in pieces] or [np.empty(0)])
-    circuit = run.scene.circuit
-    even = np.abs(np.diff(time) - np.median(np.diff(time))) < 0.01 * step
-    edges = np.flatnonzero(~even) + 1  # gaps, and last means of fewer samples
-    parts = [
-        drain_current(t, v, circuit)
-        for t, v in zip(np.split(time, edges), np.split(V_C1, edges), strict=True)
-        if t.size >= 3
-    ]
+    parts = drain_currents(time, V_C1, run.scene.circuit)
     if not parts:
         raise RunFolderError(f"{run.path} has too few samples of V_C1 to derive I_DS.")
     times, currents = [parts[0].time], [parts[0].current]

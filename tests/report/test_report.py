@@ -261,6 +261,23 @@ def test_i_ds_is_derived_where_v_c1_is_known(demo):
     assert "Hz" in findings.notes[0]
 
 
+def test_i_ds_is_derived_on_both_sides_of_a_gap_beside_which_a_mean_is_shorter(demo):
+    """While a source loads a list nothing streams: such a run had no I_DS at all."""
+    whole = find(demo).run.trace("I_DS")
+    V_C1 = demo.trace("V_C1")
+    step = V_C1.time[1] - V_C1.time[0]
+    time = V_C1.time[400:].copy()
+    time[200:] += 3.0
+    time[200] += 0.4 * step  # the middle of what is left of its cell
+    torn = replace(V_C1, time=time, mean=V_C1.mean[400:])
+    findings = find(replace(demo, traces=(torn,)))
+    assert not any("I_DS" in said for said in findings.missing)
+    derived = findings.run.trace("I_DS")
+    assert np.array_equal(derived.time, np.delete(time, 200))
+    inner = slice(250, 3000)
+    assert derived.mean[inner] == pytest.approx(whole.mean[401:][inner], abs=1e-12)
+
+
 def test_pauses_are_no_results(demo):
     pause = MeasuredTrial(
         label="recovery", level=None, start=18.0, duration=50.0,
