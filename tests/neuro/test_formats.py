@@ -28,6 +28,29 @@ def some(request, events, run):
     return events if request.param == "skin" else events_of(run)
 
 
+@pytest.fixture
+def quiet(events):
+    """The same array had nothing moved it."""
+    about = {**events.about, "started": "2026-11-22T10:00:00", "error_s": 0.0}
+    return replace(
+        events, time=events.time[:0], taxel=events.taxel[:0], count=events.count * 0,
+        about=about,
+    )  # fmt: skip
+
+
+def complaints(file):
+    """Checks of NWB's own inspector that a file does not pass."""
+    from nwbinspector import inspect_nwbfile
+
+    return {one.check_function_name for one in inspect_nwbfile(nwbfile_path=file)}
+
+
+OF_PEOPLE_AND_ANIMALS = {
+    "check_subject_species_exists", "check_experimenter_exists", "check_institution",
+}  # fmt: skip
+"""What a simulated array has none of."""
+
+
 def test_csv_gives_every_time_in_full(some, tmp_path):
     write(some, tmp_path / "e.csv")
     rows = np.loadtxt(tmp_path / "e.csv", delimiter=",", skiprows=1, ndmin=2)
@@ -85,7 +108,7 @@ def test_neo_of_a_run_has_its_force_and_trials(run):
 
 def test_nwb_has_a_unit_with_its_place_for_each_taxel(events, tmp_path):
     pynwb = pytest.importorskip("pynwb")
-    inspector = pytest.importorskip("nwbinspector")
+    pytest.importorskip("nwbinspector")
     write(events, tmp_path / "e.nwb")
     with pynwb.NWBHDF5IO(str(tmp_path / "e.nwb"), "r") as reader:
         units = reader.read().units
@@ -94,14 +117,23 @@ def test_nwb_has_a_unit_with_its_place_for_each_taxel(events, tmp_path):
             assert np.array_equal(times, events.train(taxel))
             assert (units["x"][taxel], units["y"][taxel]) == tuple(place)
         assert np.array_equal(units["largest_force"][:], events.largest_force)
-    told = {
-        message.check_function_name
-        for message in inspector.inspect_nwbfile(nwbfile_path=tmp_path / "e.nwb")
-    }
-    assert told <= {
-        "check_subject_species_exists", "check_experimenter_exists",
-        "check_institution",
-    }  # fmt: skip
+    assert complaints(tmp_path / "e.nwb") <= OF_PEOPLE_AND_ANIMALS
+
+
+def test_nwb_of_a_silent_skin_passes_the_inspector_too(quiet, tmp_path):
+    """Its empty trains ended checks of nwbinspector with an error."""
+    pynwb = pytest.importorskip("pynwb")
+    pytest.importorskip("nwbinspector")
+    write(quiet, tmp_path / "q.nwb")
+    with pynwb.NWBHDF5IO(str(tmp_path / "q.nwb"), "r") as reader:
+        read = reader.read()
+        assert read.units is None
+        told = read.processing["misc"]["silence"].to_dataframe()
+    assert told["taxel"].tolist() == list(range(len(quiet.count)))
+    assert (told["duration"] == quiet.duration).all()
+    assert np.array_equal(told[["x", "y"]], quiet.places)
+    assert np.array_equal(told["largest_force"], quiet.largest_force)
+    assert complaints(tmp_path / "q.nwb") <= OF_PEOPLE_AND_ANIMALS
 
 
 def test_aedat4_is_read_by_dv_processing(some, tmp_path):
@@ -119,11 +151,7 @@ def test_aedat4_is_read_by_dv_processing(some, tmp_path):
 
 
 @pytest.mark.parametrize("name", SPIKES)
-def test_silence_goes_out_too(events, name, tmp_path):
-    quiet = replace(
-        events, time=events.time[:0], taxel=events.taxel[:0], count=events.count * 0,
-        about={**events.about, "started": "2026-11-22T10:00:00"},
-    )  # fmt: skip
+def test_silence_goes_out_too(quiet, name, tmp_path):
     (file, *_) = write(quiet, tmp_path / f"quiet{SPIKES[name].ending}")
     assert file.stat().st_size > 0
 
