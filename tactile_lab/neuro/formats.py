@@ -129,7 +129,7 @@ def write(events: Events, file: Path, name: str | None = None) -> list[Path]:
         spikes = file.with_name(file.name.removesuffix(one.ending) + ".spikes.npz")
         with replacing(spikes) as part:
             write_spikes(events, part)
-        write_text(file, script(name))
+            write_text(file, script(name))  # neither without the other
         return [file, spikes]
     module = importlib.import_module(f"tactile_lab.neuro.{one.spikes}")
     with replacing(file) as part:

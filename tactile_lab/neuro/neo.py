@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import io
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import h5py
+
 from tactile_lab.skin.events import Events
+from tactile_lab.store.export.hdf5 import writing
 from tactile_lab.store.export.library import library
+from tactile_lab.store.progress import nothing
+
+_OPENING = threading.Lock()
 
 
 def block(events: Events) -> Any:
@@ -53,10 +63,31 @@ def write(events: Events, file: Path) -> None:
 
     Raises:
         RunFolderError: neo or nixio is not installed.
+        OSError: the disk did not take all of it.
     """
-    library("nixio")
+    nix = library("nixio.file", "nixio")
     neo_block = block(events)
     from neo.io import NixIO
 
-    with NixIO(str(file), "ow") as opened:
-        opened.write_block(neo_block)
+    with writing(file, nothing) as (disk, _):
+        with _opening_on(disk, nix):
+            opened = NixIO(str(file), "ow")
+        with opened:
+            opened.write_block(neo_block)
+
+
+@contextmanager
+def _opening_on(disk: io.RawIOBase, nix: Any) -> Iterator[None]:
+    """A NIX file that is opened within is on `disk`: nixio itself takes paths alone."""
+
+    def access() -> Any:
+        made = own()
+        made.set_fileobj_driver(h5py.h5fd.fileobj_driver, disk)
+        return made
+
+    with _OPENING:
+        own, nix.make_fapl = nix.make_fapl, access
+        try:
+            yield
+        finally:
+            nix.make_fapl = own

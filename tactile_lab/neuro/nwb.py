@@ -10,8 +10,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+import h5py
+
 from tactile_lab.skin.events import Events
+from tactile_lab.store.export.hdf5 import writing
 from tactile_lab.store.export.library import library
+from tactile_lab.store.progress import nothing
 
 COLUMNS = {
     "taxel": "number of the taxel, from 0",
@@ -26,6 +30,7 @@ def write(events: Events, file: Path) -> None:
 
     Raises:
         RunFolderError: pynwb is not installed.
+        OSError: the disk did not take all of it.
     """
     pynwb, about = library("pynwb"), events.about
     session = pynwb.NWBFile(
@@ -49,7 +54,11 @@ def write(events: Events, file: Path) -> None:
     else:
         module = session.create_processing_module("misc", "instead of units")
         module.add(_silence(pynwb, events))
-    with pynwb.NWBHDF5IO(str(file), "w") as writer:
+    with (
+        writing(file, nothing) as (disk, _),
+        h5py.File(disk, "w") as out,
+        pynwb.NWBHDF5IO(file=out, mode="w") as writer,
+    ):
         writer.write(session)
 
 

@@ -1,5 +1,6 @@
 """Spikes come back from the library that reads a format as they went out."""
 
+import gc
 import subprocess
 import sys
 from dataclasses import replace
@@ -7,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from full_disk import full_after
 
 from tactile_lab.cli import cli
 from tactile_lab.errors import ParameterError, RunFolderError
 from tactile_lab.neuro import neo as to_neo
+from tactile_lab.neuro import scripts
 from tactile_lab.neuro.formats import SPIKES, format_of, write
 from tactile_lab.neuro.of_run import events_of
 from tactile_lab.neuro.tonic import structured
@@ -134,6 +137,28 @@ def test_nwb_of_a_silent_skin_passes_the_inspector_too(quiet, tmp_path):
     assert np.array_equal(told[["x", "y"]], quiet.places)
     assert np.array_equal(told["largest_force"], quiet.largest_force)
     assert complaints(tmp_path / "q.nwb") <= OF_PEOPLE_AND_ANIMALS
+
+
+@pytest.mark.parametrize("room", [100, 20_000])
+@pytest.mark.parametrize("form", ["neo", "nwb"])
+def test_a_full_disk_is_told_in_plain_words(skin_folder, tmp_path, form, room, capfd):
+    """HDF5 under Neo told of it in a hundred lines of a trace, and crashed."""
+    out = tmp_path / "made"
+    asked = "export", skin_folder, "--to", form, "--out", out
+    with full_after(room):
+        done = tell(*asked)
+    gc.collect()
+    assert done.exit_code == 2
+    assert f"{out} cannot be written: File too large. Name another" in done.output
+    assert not capfd.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_script_that_found_no_room_leaves_no_spikes(events, tmp_path, monkeypatch):
+    monkeypatch.setattr(scripts, "script", lambda name: " " * 1_000_000)
+    with full_after(500_000), pytest.raises(OSError, match="too large"):
+        write(events, tmp_path / "e.brian2.py")
+    assert not list(tmp_path.iterdir())
 
 
 def test_aedat4_is_read_by_dv_processing(some, tmp_path):
