@@ -239,8 +239,19 @@ def _noting_endings() -> Iterator[Callable[[], None]]:
         if heard:
             handlers[heard[0]](heard[0], None)
 
+    told = sys.unraisablehook
+
+    def untold(lost: sys.UnraisableHookArgs) -> None:
+        # an object's end raises nothing; `look` does, so Python need not print it
+        if not (heard and issubclass(lost.exc_type, SystemExit | KeyboardInterrupt)):
+            told(lost)
+
     with minded(dict.fromkeys(handlers, note)):
-        yield look
+        sys.unraisablehook = untold
+        try:
+            yield look
+        finally:
+            sys.unraisablehook = told
 
 
 class StatusLine:

@@ -201,6 +201,43 @@ def test_nwb_without_pynwb_says_what_to_install(run, tmp_path, monkeypatch):
         nwb.export(run, tmp_path / "run.nwb", Selection())
 
 
+@pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
+@pytest.mark.parametrize("form", ["csv", "mat"])
+def test_a_signal_that_meets_the_end_of_an_object_is_told_in_no_trace(
+    complete, tmp_path, form
+):
+    program = """
+import os
+import signal
+import sys
+from tactile_lab.cli import main
+from tactile_lab.store.selection import Selection
+
+whole = Selection.pieces
+
+class Ends:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+
+def pieces(self, run):
+    for piece in whole(self, run):
+        Ends()
+        yield piece
+
+Selection.pieces = pieces
+main(sys.argv[1:])
+"""
+    asked = ("export", complete, "--to", form, "--out", tmp_path / "out")
+    done = subprocess.run(
+        [sys.executable, "-c", program, *asked],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 128 + signal.SIGTERM, done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.rglob("*.part*"))
+    assert not (tmp_path / "out").is_file()
+
+
 TOLD_TO_END = """
 import os
 import signal
