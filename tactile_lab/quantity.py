@@ -189,6 +189,14 @@ def plus_minus(value: float, half: float, unit: str = "", digits: int = 2) -> st
     return printed(text).rstrip()
 
 
+def show_within(value: float, error: float, unit: str = "") -> str:
+    """A value (SI) down to the second digit of its error, and to four at least."""
+    if not ROUNDING * abs(value) < error < math.inf or value == 0:
+        return show(value, unit)
+    first, last = (math.floor(math.log10(abs(x))) for x in (value, error))
+    return show(value, unit, max(4, first - last + 2))
+
+
 def rounded(value: float, sign: Literal["-", "+"] = "-") -> str:
     """Two significant digits, written out: "260" and "−0.044", not "2.6e+02".
 

@@ -20,11 +20,12 @@ from tactile_lab.analysis.control_chart import (
 from tactile_lab.conclusion import Table
 from tactile_lab.errors import ParameterError
 from tactile_lab.plot import Guide, Panel, Plot, Series
-from tactile_lab.quantity import count, plus_minus, show
+from tactile_lab.quantity import count, plus_minus, show, show_within
 from tactile_lab.report.canvas import draw, save
 from tactile_lab.report.html import picture, write_page_of_runs
 
-DAY = 86400.0
+TIMES = {"Days": 86400.0, "Hours": 3600.0, "Minutes": 60.0, "Seconds": 1.0}
+"""What runs may be apart in, s: the first of which they span two."""
 
 
 @dataclass(frozen=True)
@@ -81,10 +82,13 @@ class OverRuns:
     @property
     def sentences(self) -> list[str]:
         """What it says, for a person."""
+        of = count(len(self.points), "run")
         values = [one.value for one in self.points]
-        mean, error = mean_and_error(values)
-        of = count(len(values), "run")
-        known = plus_minus(mean, error, self.unit)
+        specimens = self._specimens()
+        if 1 < len(specimens) < len(values):
+            values = [mean_and_error(of_one)[0] for of_one in specimens.values()]
+            of = f"over the means of {count(len(values), 'specimen')}, {of}"
+        known = plus_minus(*mean_and_error(values), self.unit)
         said = [f"{self.key}: {known} (standard error, {of})."]
         simulated = sum(one.simulated for one in self.points)
         if 0 < simulated < len(self.points):
@@ -113,6 +117,13 @@ class OverRuns:
             said.append("All lie within, and none drifts.")
         return said
 
+    def _specimens(self) -> dict[str, list[float]]:
+        """Values by specimen; a run without one is a specimen of its own."""
+        found: dict[str, list[float]] = {}
+        for one in self.points:
+            found.setdefault(one.sensor or one.run, []).append(one.value)
+        return found
+
     def _told_apart(self, low: float, high: float, *outside: float) -> list[str]:
         """The limits and what lies outside, in digits that tell them apart."""
         for digits in range(4, 18):
@@ -130,9 +141,8 @@ class OverRuns:
             values = [one.value for one in self.points if one.sensor == sensor]
             mean, error = mean_and_error(values)
             shown = "" if math.isnan(error) else show(error, self.unit)
-            rows.append(
-                (sensor or "not noted", str(len(values)), show(mean, self.unit), shown)
-            )
+            told = show_within(mean, error, self.unit)
+            rows.append((sensor or "not noted", str(len(values)), told, shown))
         return Table(
             title="Specimens",
             headings=("Sensor", "Runs", f"{self.key}", "Standard error"),
@@ -141,14 +151,14 @@ class OverRuns:
 
     @property
     def plot(self) -> Plot:
-        """Every run, the mean and the limits, against days."""
+        """Every run, the mean and the limits, against time."""
         first = self.points[0].started
-        days = np.array(
-            [(p.started - first).total_seconds() / DAY for p in self.points]
-        )
+        after = np.array([(p.started - first).total_seconds() for p in self.points])
+        name = next((n for n, unit in TIMES.items() if after[-1] >= 2 * unit), "Days")
+        times = after / TIMES[name]
         values = np.array([one.value for one in self.points])
         guides: tuple[Guide, ...] = ()
-        series = [Series(x=days, y=values, mark="joined")]
+        series = [Series(x=times, y=values, mark="joined")]
         if self.chart is not None:
             guides = (
                 Guide(at=self.chart.mean, along="x", text="mean", dashed=False),
@@ -158,14 +168,14 @@ class OverRuns:
             odd = list(self.chart.outside)
             if odd:
                 series.append(
-                    Series(x=days[odd], y=values[odd], mark="open", colour="V_C1",
+                    Series(x=times[odd], y=values[odd], mark="open", colour="V_C1",
                            name="outside")
                 )  # fmt: skip
         return Plot(
             name="over_runs",
-            caption=f"{self.key} of each run, in days since {first:%Y-%m-%d %H:%M}; "
-            "dashed, the limits of what is usual.",
-            x_label="Days",
+            caption=f"{self.key} of each run"
+            + ("; dashed, the limits of what is usual." if guides else "."),
+            x_label=f"{name} since {first:%Y-%m-%d %H:%M}",
             panels=(
                 Panel(
                     label=self.key, unit=self.unit, series=tuple(series), guides=guides

@@ -15,7 +15,7 @@ from tactile_lab.analysis.estimate import student_95
 from tactile_lab.conclusion import Table
 from tactile_lab.errors import ParameterError
 from tactile_lab.plot import Panel, Plot, Series
-from tactile_lab.quantity import count, show
+from tactile_lab.quantity import count, show, show_within
 from tactile_lab.report.canvas import draw, save
 from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
@@ -298,7 +298,7 @@ def _known(values: Iterable[float]) -> list[float]:
 
 
 def _pair(mean: float, error: float, unit: str) -> tuple[str, str]:
-    return _shown(mean, unit), _shown(error, unit)
+    return show_within(mean, error, unit), _shown(error, unit)
 
 
 def _shown(value: float, unit: str) -> str:

@@ -27,6 +27,14 @@ def test_a_flat_row_of_points_stands_clear_of_the_upper_end():
     assert high > 0.88 * 1.03
 
 
+@pytest.mark.parametrize("values", [(0.0, 1.0), (4.3668, 4.3688), (-1234.51, -1234.48)])
+def test_the_name_of_y_stands_clear_of_its_numbers(values):
+    drawn = axes(Series(x=[0, 1], y=values, mark="joined"))
+    numbers = [one.get_window_extent().x0 for one in drawn.get_yticklabels()]
+    name = drawn.yaxis.label.get_window_extent()
+    assert 0 < name.x0 and name.x1 < min(numbers)
+
+
 def test_what_counts_has_whole_numbers_and_each_of_a_few():
     dots = Series(x=[0, 1], y=[1, 5], mark="dots")
     scans = axes(dots, limits=(0.5, 5.5), whole=True, height=1.3)

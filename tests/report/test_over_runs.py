@@ -72,6 +72,31 @@ def test_few_runs_have_a_mean_and_no_limits():
         OverRuns.of("tau", "s", [])
 
 
+def test_runs_of_one_specimen_are_no_specimens():
+    """Four runs of two were told as four independent values, with half the error."""
+    found = OverRuns.of("tau", "s", points([8.0, 9.0, 8.000002, 9.0], "AB"))
+    assert found.sentences[0] == (
+        "tau: 8.50 ± 0.50 s (standard error, over the means of 2 specimens, 4 runs)."
+    )
+    assert found.table.rows[0] == ("A", "2", "8.000001 s", "1 µs"), "to its error"
+    unnamed = OverRuns.of("tau", "s", points([8.0, 9.0], [""]))
+    assert unnamed.sentences[0].endswith("(standard error, 2 runs).")
+
+
+@pytest.mark.parametrize(
+    ("apart", "told"), [(20.0, "Seconds"), (3000.0, "Minutes"), (86400.0, "Days")]
+)
+def test_time_is_told_in_what_the_runs_are_apart_in(apart, told):
+    begun = datetime(2026, 1, 1, 9, 30, tzinfo=UTC)
+    runs = [
+        RunValue(f"run{i}", begun + i * timedelta(seconds=apart), "A", 8.0 + i, True)
+        for i in range(3)
+    ]
+    plot = OverRuns.of("tau", "s", runs).plot
+    assert plot.x_label == f"{told} since 2026-01-01 09:30"
+    assert 2 <= plot.panels[0].series[0].x[-1] < 101
+
+
 def test_from_run_folders_to_a_page(tmp_path):
     for k in range(9):
         told = {"protocol": "hold", "notes": {"sensor": f"S{k % 2 + 1}"}}
