@@ -67,8 +67,9 @@ def fit_transfer(
         V_GS: gate-source voltage, V.
         I_DS: drain current, A; points at or below 0 A are left out.
         V_T: thermal voltage, V.
-        between: V_GS to fit, V, and by a line without leakage; by default up to
-            2.75 V and from five times the smallest current up.
+        between: V_GS to fit, V, its ends in either order, and by a line without
+            leakage; by default up to 2.75 V and from five times the smallest current
+            up.
 
     Raises:
         ParameterError: unequal shapes or values that are not finite.
@@ -86,6 +87,7 @@ def fit_transfer(
         raise ParameterError("A transfer curve must hold finite numbers only.")
     use = amperes > 0
     if between is not None:
+        between = min(between), max(between)
         use &= (volts >= between[0]) & (volts <= between[1])
     elif use.any():
         floor = amperes[use].min()

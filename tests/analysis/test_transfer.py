@@ -56,8 +56,9 @@ def test_its_intervals_cover_the_truth_beside_what_leaks(floor, noise):
     assert np.all(hits / repeats > 0.85)
 
 
-def test_a_range_can_be_chosen():
-    found = fit_transfer(V, curve(), between=(1.0, 2.0))
+@pytest.mark.parametrize("ends", [(1.0, 2.0), (2.0, 1.0)])
+def test_a_range_can_be_chosen(ends):
+    found = fit_transfer(V, curve(), between=ends)
     assert found.range == (1.0, 2.0)
     assert found.points == 21
 
