@@ -95,8 +95,6 @@ def noise(values: FloatArray, interval: float) -> Noise:
     Raises:
         NotIdentifiableError: less than two seconds.
     """
-    import scipy.signal
-
     size = round(SEGMENT / interval)
     segments = (values.size - size // 2) // max(size - size // 2, 1)
     if segments < FEWEST:
@@ -104,7 +102,8 @@ def noise(values: FloatArray, interval: float) -> Noise:
             f"{values.size * interval:.2g} s were seen, "
             f"{SEGMENT * (FEWEST + 1) / 2:g} are needed for a spectrum"
         )
-    frequency, power = scipy.signal.welch(values, 1 / interval, "hann", size)
+    frequency = np.arange(size // 2 + 1) / (size * interval)
+    power = _welch(values, interval, size, segments)
     return Noise(
         frequency=frequency[1:],
         density=np.sqrt(power[1:]),
@@ -114,6 +113,21 @@ def noise(values: FloatArray, interval: float) -> Noise:
         segments=segments,
         resolution=float(frequency[1]),
     )
+
+
+def _welch(values: FloatArray, interval: float, size: int, segments: int) -> FloatArray:
+    """Power per Hz of the values, mean of segments of `size` each less its mean.
+
+    As scipy.signal.welch has it, whose import took a third of a report's time.
+    """
+    window = 0.5 - 0.5 * np.cos(2 * np.pi / size * np.arange(size))
+    power = np.zeros(size // 2 + 1)
+    for begin in (size - size // 2) * np.arange(segments):
+        part = values[begin : begin + size]
+        power += np.abs(np.fft.rfft(window * (part - np.mean(part)))) ** 2
+    power *= interval / (segments * np.sum(window**2))
+    power[1 : (size + 1) // 2] *= 2.0  # 0 Hz and half the rate have no other side
+    return power
 
 
 def _lines(frequency: FloatArray, power: FloatArray) -> list[MainsLine]:

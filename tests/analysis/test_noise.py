@@ -56,6 +56,16 @@ def test_noise_alone_seldom_shows_a_line() -> None:
     assert told <= 12, "of 800 looked for"
 
 
+@pytest.mark.parametrize("rate", [1999, 2000])
+def test_the_last_bin_is_counted_twice_only_below_half_the_rate(rate: int) -> None:
+    at = (rate // 2) / rate
+    values = np.cos(2 * np.pi * at * np.arange(4 * rate))
+    found = noise(values, 1 / rate)
+    assert found.frequency[-1] == pytest.approx(rate // 2)
+    power = np.sum(found.density**2) * found.resolution
+    assert power == pytest.approx(np.mean(values**2), rel=1e-3)
+
+
 def test_a_short_stretch_is_refused() -> None:
     with pytest.raises(NotIdentifiableError, match=r"1 s were seen, 2 are needed"):
         noise(np.zeros(20_000), 1 / RATE)
