@@ -284,8 +284,10 @@ class StoredRun:
         rows = self.records("gaps")
         gaps = np.empty(rows.size, [("start", "f8"), ("end", "f8"), ("missing", "i8")])
         interval = float(self.attributes.get("interval", 0.0))
-        gaps["start"] = rows["time"] - rows["missing"] * interval
-        gaps["end"], gaps["missing"] = rows["time"], rows["missing"]
+        end: FloatArray = rows["time"]
+        missing: FloatArray = rows["missing"] * interval
+        gaps["start"], gaps["end"] = end - missing, end
+        gaps["missing"] = rows["missing"]
         return gaps
 
     @property

@@ -107,24 +107,27 @@ def dated_current(run: Run) -> NDArray[Any]:
     names = rows.dtype.names or ()
     found = np.empty(rows.size, [(name, "f8") for name in UNITS["current"]])
     found["setpoint"], found["measured"] = rows["setpoint"], rows["measured"]
-    found["heard"] = found["time"] = rows["time"]
+    time: FloatArray = rows["time"]
+    found["heard"] = found["time"] = time
     if "acted" in names:
-        found["time"] = np.fmin(rows["time"], rows["acted"])
+        acted: FloatArray = rows["acted"]
+        found["time"] = np.fmin(time, acted)
     return found
 
 
 def _trials(run: Run) -> ExportTable:
     rows = run.trials
     held = [hold or (np.nan, np.nan) for hold in holds(run, rows)]
-    stood = np.array(held).reshape(-1, 2)
+    start: FloatArray = rows["start"]
+    stood = start[:, None] + np.array(held, dtype=np.float64).reshape(-1, 2)
     columns = {
         "index": rows["index"],
         "label": _plain(rows["label"]),
         "level": rows["level"],
-        "start": rows["start"],
+        "start": start,
         "end": rows["end"],
-        "hold_start": rows["start"] + stood[:, 0],
-        "hold_end": rows["start"] + stood[:, 1],
+        "hold_start": stood[:, 0],
+        "hold_end": stood[:, 1],
         "spikes": rows["spikes"],
         "pause": rows["pause"],
         "complete": ended(rows).astype(np.uint8),
