@@ -48,6 +48,8 @@ NOTHING = 5e-3
 GRID = 200
 """Times at which a current is looked at for its mean over a hold."""
 
+Shunt = Callable[[float, float], tuple[float, float] | None]
+
 
 class DriveCheck:
     """Compares them, and says once of each what does not fit.
@@ -69,7 +71,7 @@ class DriveCheck:
         trial: Trial,
         asked: Waveform | None,
         current: FloatArray,
-        shunt: Callable[[float, float], float | None],
+        shunt: Shunt,
         readings: Iterable[Reading],
     ) -> list[str]:
         """What does not fit in a trial that has ended; [] also where nothing is known.
@@ -80,7 +82,8 @@ class DriveCheck:
                 no coil plays it.
             current: as read back, shape (n, 2), s from its start and A.
             shunt: mean current, A, of the scope's channel between two times of the
-                trial, s; None where it has none.
+                trial, s, and from when on: what came long before is no longer known.
+                None where it has none.
             readings: of the field, times from the trial's start.
         """
         if trial.hold is None:
@@ -106,7 +109,7 @@ class DriveCheck:
         held: FloatArray,
         window: tuple[float, float],
         steady: bool,
-        shunt: Callable[[float, float], float | None],
+        shunt: Shunt,
         readings: Iterable[Reading],
     ) -> list[tuple[str, str]]:
         """What to say of field and shunt beside the current of that window, s."""
@@ -125,8 +128,9 @@ class DriveCheck:
             found.append(("field", self._field(pairs)))
         seen = shunt(begin, end)
         if seen is not None:
-            amperes = float(np.interp(np.linspace(begin, end, GRID), *held.T).mean())
-            found.append(("shunt", _shunt(amperes, seen)))
+            since, mean = seen
+            amperes = float(np.interp(np.linspace(since, end, GRID), *held.T).mean())
+            found.append(("shunt", _shunt(amperes, mean)))
         return found
 
     def _field(self, pairs: list[tuple[FloatArray, float]]) -> str:

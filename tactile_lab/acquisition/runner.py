@@ -247,8 +247,13 @@ class Runner:
         if self._program.asked_field is not None:
             readings = []  # what a person types is doubted as it is typed
 
-        def shunt(begin: float, end: float) -> float | None:
-            return self._live.levels(shown + begin, shown + end).get("coil_current")
+        def shunt(begin: float, end: float) -> tuple[float, float] | None:
+            if "coil_current" not in self._live.signals:
+                return None
+            kept = self._live.between(shown + begin, shown + end, "coil_current")
+            if kept.time.size == 0:
+                return None
+            return float(kept.time[0]) - shown, float(kept.mean.mean())
 
         for text in check.doubts(trial, asks, current, shunt, readings):
             self._account.warn(text)

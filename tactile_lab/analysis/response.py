@@ -17,8 +17,8 @@ HARMONICS = 6
 FEWEST = 1.4
 """Cycles from which on a sine is told apart from drift: of 1.2 its gain is known ten
 times worse, of one the answer, and its interval, may be anything."""
-NOT_YET = 3.0
-"""A cause so many times further from its sine than later on is not yet on it."""
+NOT_YET = 1.5
+"""A cause so many times further from its sine than ever later is not yet on it."""
 MOST_LINES = 8
 """Lines of the answer's noise that are told apart from it, at most."""
 LINE = 30.0
@@ -141,8 +141,8 @@ def _begun(time: FloatArray, cause: FloatArray, frequency: float) -> int:
     sine = np.column_stack([np.sin(phase), np.cos(phase), np.ones_like(time)])
     half = time.size // 2
     away = np.abs(cause - sine @ (np.linalg.pinv(sine[half:]) @ cause[half:]))
-    usual = float(np.sqrt(np.mean(away[half:] ** 2)))
-    not_yet = np.flatnonzero(away[:half] > NOT_YET * usual + 1e-9 * np.ptp(cause))
+    later = float(away[half:].max())
+    not_yet = np.flatnonzero(away[:half] > NOT_YET * later + 1e-9 * np.ptp(cause))
     return int(not_yet[-1]) + 1 if not_yet.size else 0
 
 

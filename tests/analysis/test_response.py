@@ -104,6 +104,15 @@ def test_a_force_that_comes_late_onto_its_sine_turns_no_phase():
     assert found.gain.value == pytest.approx(np.cos(angle), rel=2e-4)
 
 
+def test_a_cause_that_scatters_is_on_its_sine_from_its_begin():
+    """Of many points a few lie three times as far off as usual, anywhere."""
+    time, f = np.arange(0, 200, 0.01), 0.01
+    sine = np.sin(2 * np.pi * f * time)
+    cause = sine + np.random.default_rng(1).normal(0, 1e-3, time.size)
+    found = gain(time, cause, 2 * sine, f)
+    assert found.gain.value == pytest.approx(2.0, rel=1e-3)
+
+
 def test_a_pattern_of_codes_is_no_scatter_of_the_phase():
     time, code = np.arange(0, 40, 0.01), 16e-3
     wave = 2 * np.pi * 0.05 * time
