@@ -246,6 +246,7 @@ from tactile_lab.cli import main
 from tactile_lab.store.selection import Selection
 
 whole = Selection.pieces
+signal.signal(signal.{name}, signal.SIG_DFL)  # nohup has SIGHUP ignored, and is heeded
 
 def pieces(self, run):
     for piece in whole(self, run):
