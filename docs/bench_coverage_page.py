@@ -154,8 +154,10 @@ Of each row that names two commits, the first 30 seeds were run again at the lat
 (`docs/make_bench_coverage.py --again`, from what `docs/bench-coverage.csv` keeps). They
 told the same numbers and intervals, within 0.2 % of a half-width.
 
-The rows of `threshold_trim` and `threshold_drift` are of both commits that they name:
-every second seed up to 122 of the earlier one, all others of the later.
+Others are of both commits that they name: `threshold_trim` and `threshold_drift` with
+every second seed up to 122 of the earlier one, `rate_force` with the shunt, between
+whose commits no code changed, with 204 of the first 208; all other seeds are of the
+later.
 
 `identify` fits what a converter's steps leave of V_C1's means since ab8a537e; its rows
 of earlier commits are of before, when of 30 runs of `rate_force` with the shunt V_GS
