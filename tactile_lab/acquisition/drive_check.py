@@ -49,6 +49,8 @@ GRID = 200
 """Times at which a current is looked at for its mean over a hold."""
 
 Shunt = Callable[[float, float], tuple[float, float] | None]
+"""Between two times of a trial, s: from when on the scope's channel of the current is
+still known, s, and its mean since, A; None where there is none."""
 
 
 class DriveCheck:
@@ -81,9 +83,7 @@ class DriveCheck:
             asked: current that it asks for, A against s from its start; None where
                 no coil plays it.
             current: as read back, shape (n, 2), s from its start and A.
-            shunt: mean current, A, of the scope's channel between two times of the
-                trial, s, and from when on: what came long before is no longer known.
-                None where it has none.
+            shunt: what the scope saw of the current.
             readings: of the field, times from the trial's start.
         """
         if trial.hold is None:

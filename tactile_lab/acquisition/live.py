@@ -127,14 +127,22 @@ class LiveBins:
             pairs = zip(self._channels, self._levels, strict=True)
             return count, {one.signal: level.since(first) for one, level in pairs}
 
+    def mean(self, signal: str, start: float, end: float) -> tuple[float, float] | None:
+        """From when on, s, what is in [start, end) s is still kept, and its mean.
+
+        None where the signal is not measured or nothing of it is kept.
+        """
+        if signal not in self.signals:
+            return None
+        kept = self.between(start, end, signal)
+        if kept.time.size == 0:
+            return None
+        return float(kept.time[0]), float(kept.mean.mean())
+
     def levels(self, start: float, end: float) -> dict[str, float]:
         """Mean of each measured signal over [start, end) s, where there is any."""
-        found = {}
-        for signal in self.signals:
-            mean = self.between(start, end, signal).mean
-            if mean.size:
-                found[signal] = float(mean.mean())
-        return found
+        means = {signal: self.mean(signal, start, end) for signal in self.signals}
+        return {signal: seen[1] for signal, seen in means.items() if seen is not None}
 
     def traces(
         self, start: float, end: float, points: int = 4000

@@ -248,12 +248,8 @@ class Runner:
             readings = []  # what a person types is doubted as it is typed
 
         def shunt(begin: float, end: float) -> tuple[float, float] | None:
-            if "coil_current" not in self._live.signals:
-                return None
-            kept = self._live.between(shown + begin, shown + end, "coil_current")
-            if kept.time.size == 0:
-                return None
-            return float(kept.time[0]) - shown, float(kept.mean.mean())
+            seen = self._live.mean("coil_current", shown + begin, shown + end)
+            return None if seen is None else (seen[0] - shown, seen[1])
 
         for text in check.doubts(trial, asks, current, shunt, readings):
             self._account.warn(text)
