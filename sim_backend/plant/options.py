@@ -116,7 +116,7 @@ class PlantOptions:
     @property
     def speed(self) -> Follower:
         """Pole and slew of the voltage followers."""
-        return Follower.of(self.follower * self.follower_pole, self.slew)
+        return Follower.of(self.follower_pole if self.follower else 0.0, self.slew)
 
     def warmer(self, time: float) -> float:
         """By how much the sensor is warmer at `time` s than at 0 s, K."""

@@ -134,11 +134,10 @@ def _clear_of_numbers(axes: Axes) -> None:
     """Move the name of y to the left where its numbers have many digits."""
     label = axes.yaxis.label
     numbers = [one.get_window_extent() for one in axes.get_yticklabels()]
-    here = label.get_window_extent()
-    over = here.x1 - min((one.x0 for one in numbers if one.width), default=np.inf)
-    if label.get_rotation() and over > 0:
-        x, y = axes.transAxes.inverted().transform((here.x1 - over, 0))[0], 0.5
-        axes.yaxis.set_label_coords(x - 0.03 * DPI / axes.bbox.width, y)
+    left = min((one.x0 for one in numbers if one.width), default=np.inf)
+    if label.get_rotation() and label.get_window_extent().x1 > left:
+        clear = left - 0.03 * DPI - axes.bbox.x0
+        axes.yaxis.set_label_coords(clear / axes.bbox.width, 0.5)
 
 
 def _stagger(texts: list[Annotation]) -> None:
