@@ -262,10 +262,9 @@ def drifting(run: RunData, values: dict[str, Any], true: Truth) -> Told:
     """The critical force as it is followed, and its drift where nothing drifts."""
     force = critical(run, true)
     for found in values["critical_forces"]:
-        known = run.uncertain(found["force_N"])
-        assert known is not None
-        half = found["half_width_N"] + known
-        yield from around("critical force", found["force_N"], half, force)
+        yield from around(
+            "critical force", found["force_N"], found["uncertainty_N_95"], force
+        )
     yield from of("drift", values.get("drift_N_per_h"), 0.0)
 
 

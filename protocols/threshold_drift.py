@@ -77,7 +77,7 @@ class ThresholdDrift(Recovering):
         values: dict[str, Any] = {
             "critical_forces": [
                 {"time_s": b.time, "force_N": b.middle, "half_width_N": b.half,
-                 "temperature_K": b.kelvin}
+                 "uncertainty_N_95": _alone(run, b), "temperature_K": b.kelvin}
                 for b in found
             ]
         }  # fmt: skip
@@ -93,7 +93,7 @@ class ThresholdDrift(Recovering):
             f"The critical force lay between {show(forces.min(), 'N')} and "
             f"{show(forces.max(), 'N')}, each known to ±{show(found[0].half, 'N', 2)} "
             f"({len(found)} values).",
-            *_stated(run, float(forces.mean())),
+            *_stated(run, found, float(forces.mean())),
         ]
         by_time = _slope(found, np.array([b.time for b in found]) / HOUR)
         values["drift_N_per_h"] = by_time
@@ -198,14 +198,24 @@ def _bracket(
     )
 
 
-def _stated(run: Measurement, force: float) -> tuple[str, ...]:
-    """What calibration and geometry leave open of all forces together."""
+def _alone(run: Measurement, bracket: ForceBracket) -> float | None:
+    """95 % of one critical force, N, by its bracket and what is stated of forces."""
+    known = run.uncertain(bracket.middle)
+    return None if known is None else math.hypot(bracket.half, known)
+
+
+def _stated(
+    run: Measurement, found: list[ForceBracket], force: float
+) -> tuple[str, ...]:
+    """What calibration and geometry leave open of all forces together, and of each."""
     known = run.uncertain(force)
     if known is None:
         return run.not_stated
+    alone = max(_alone(run, bracket) or known for bracket in found)
     said = (
         f"All of them together may be off by {show(known, 'N', 2)} (95 %), by what "
-        "calibration and geometry leave open."
+        "calibration and geometry leave open; each by itself, with half its bracket, "
+        f"by {show(alone, 'N', 2)}."
     )
     return (said, *run.not_stated)
 

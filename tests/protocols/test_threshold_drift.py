@@ -1,5 +1,6 @@
 """The critical force is followed, and its slope against temperature told."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -120,6 +121,10 @@ def test_a_temperature_that_stands_still_is_said():
     told = protocol.conclude(known).text
     assert "All of them together may be off by 3 mN (95 %)" in told
     assert "A1" not in told
+    assert "each by itself, with half its bracket, by 3.1 mN" in told
+    for one in protocol.conclude(known).values["critical_forces"]:
+        stated = 0.03 * one["force_N"]
+        assert one["uncertainty_N_95"] == pytest.approx(math.hypot(5e-4, stated))
     bare = replace(run, force_uncertainty=ForceUncertainty(1e-3, 0.0, unstated=True))
     assert (
         "no uncertainty of Eq. (2)'s r, A1, A2 and B1" in protocol.conclude(bare).text
