@@ -111,6 +111,20 @@ def cli() -> None:
     """Instrument control for spiking, adapting piezoelectric tactile sensors."""
 
 
+ALGEBRA = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+"""Read as numpy is loaded: how many threads its linear algebra starts."""
+
+
+def _calculate_in_one_thread() -> None:
+    """Have each process calculate in one thread, unless the user asks for more.
+
+    Two wait for each other: where other programs keep the cores busy, an inverse of
+    9000 x 15 took 165 ms of processor time instead of 3.4.
+    """
+    for name in ALGEBRA:
+        os.environ.setdefault(name, "1")
+
+
 def _open_streams() -> None:
     """Give each standard stream that was closed before the start a place to go."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
@@ -120,6 +134,7 @@ def _open_streams() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit with its code."""
+    _calculate_in_one_thread()
     _open_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

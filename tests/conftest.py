@@ -27,6 +27,9 @@ for _name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME", "XDG_STATE_HOME"):
     (HOME / _name).mkdir()
     os.environ[_name] = str(HOME / _name)
 
+# as the program does, before numpy is loaded: workers share the cores
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 COILS = Path(os.environ["XDG_STATE_HOME"], "tactile-lab", "coils")
 
 

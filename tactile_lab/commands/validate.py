@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -18,9 +17,6 @@ WRONG = 1
 @click.group()
 def command() -> None:
     """Measure the solver of the model; each report states commit, date and machine."""
-    # before numpy starts its threads
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
 
 
 out_option: Callable[..., Any] = click.option(

@@ -11,7 +11,7 @@ import click
 import pytest
 from loaded import loaded_after
 
-from tactile_lab.cli import VERBS, cli, main
+from tactile_lab.cli import ALGEBRA, VERBS, cli, main
 
 HEAVY = {
     "numpy",
@@ -176,3 +176,20 @@ def test_streams_that_were_closed_before_the_start(tmp_path, closed):
     assert done.returncode == 0
     (run,) = (tmp_path / "runs").iterdir()
     assert json.loads((run / "run.json").read_text())["status"] == "complete"
+
+
+def test_linear_algebra_takes_one_thread_unless_asked_for_more(tmp_path):
+    """Of two, on busy cores, each waits for the other far longer than it works."""
+    told = (
+        "import atexit; from threadpoolctl import threadpool_info;"
+        "atexit.register(lambda: print({one['num_threads'] for one in"
+        " threadpool_info() if one['user_api'] == 'blas'}));"
+        "from tactile_lab.cli import main; main(['plan', 'demo'])"
+    )
+    bare = {name: v for name, v in os.environ.items() if name not in ALGEBRA}
+    for asked, threads in (({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2)):
+        done = subprocess.run(
+            [sys.executable, "-c", told], capture_output=True, text=True,
+            cwd=tmp_path, env=bare | asked, check=True,
+        )  # fmt: skip
+        assert done.stdout.splitlines()[-1] == f"{{{threads}}}"
