@@ -128,7 +128,7 @@ class QuestionCard(Overlay):
         self.ask_with(
             self._sign,
             [self.text, self.doubt, typed, self.before, self.coil],
-            [self.stop, self.done],
+            [self.done, self.stop],
         )
 
 

@@ -35,9 +35,9 @@ def test_run_waits_for_a_person_until_it_is_done_or_stopped(lab) -> None:
     for key in (Qt.Key.Key_A, Qt.Key.Key_Space, Qt.Key.Key_Return):
         QTest.keyClick(lab.app.focusWidget(), key)  # of a note that is typed just then
     assert len(done) == 1 and window.question.isVisible(), "nobody moved the probes"
-    for _ in range(2):
+    for part in (window.question.done, window.question.stop):  # Tab, Enter: Done
         QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Tab)
-    assert lab.app.focusWidget() is window.question.done
+        assert lab.app.focusWidget() is part
     session.run.take(Ended(Ending.refused("stopped at the bench")))
     session.acknowledge()
     assert not window.question.isVisible(), "a run that ended waits for nobody"
