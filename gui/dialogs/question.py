@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from PySide6.QtCore import QEvent, QObject, QTimer
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from gui.dialogs.overlay import Overlay
@@ -17,12 +19,17 @@ from tactile_lab.quantity import show
 
 TYPING = " Tab goes to the buttons: what is typed on answers nothing."
 
+QUIET = 500
+"""Time without a key until a question that came by itself heeds one, ms."""
+
 
 class QuestionCard(Overlay):
     """Shown from the question until it is done or the run is stopped.
 
     It comes by itself: where somebody types in a field just then, no button of it gets
-    the keyboard, for the next space would say that the probes were moved.
+    the keyboard, for the next space would say that the probes were moved. Keys meant
+    for what had the keyboard do nothing in it, until none came for `QUIET`; those of
+    STOP, which never reach it, act.
     """
 
     def __init__(self, window: QWidget, session: Session, theme: Theme) -> None:
@@ -30,6 +37,7 @@ class QuestionCard(Overlay):
         self._session, self._theme = session, theme
         self._shown: PersonAsked | None = None
         self._last = ""
+        self._quiet = QTimer(self, singleShot=True, interval=QUIET)
         self._sign = QLabel()
         self.text = label("", "big", wrap=True)
         self.doubt = label("", "error", wrap=True)
@@ -41,11 +49,28 @@ class QuestionCard(Overlay):
         self.done = push("Done", "primary")
         self.stop = push("Stop the run", "danger")
         self._lay_out()
+        for part in (self.card, self.entry, self.done, self.stop):
+            part.installEventFilter(self)
         self.entry.textChanged.connect(self._judge)
         self.entry.returnPressed.connect(self._done)
         self.done.clicked.connect(self._done)
         self.stop.clicked.connect(lambda: session.stop("stopped at the bench"))
         session.status.changed.connect(self._follow)
+
+    @property
+    def heeds_keys(self) -> bool:
+        """Whether what is typed now is meant for the question."""
+        return not self._quiet.isActive()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Keep keys from the card that were meant for what had the keyboard before."""
+        if watched is self._window:
+            return super().eventFilter(watched, event)
+        pressed = isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress
+        if not pressed or self.heeds_keys:
+            return False
+        self._quiet.start()
+        return True
 
     def _follow(self) -> None:
         asked = self._session.run.asked
@@ -74,6 +99,7 @@ class QuestionCard(Overlay):
         self.entry.clear()
         self._judge()
         self.open()
+        self._quiet.start()
         (self.entry if reads else self.card if typing else self.done).setFocus()
 
     def _coil_words(self, current: float | None) -> str:

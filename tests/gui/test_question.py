@@ -34,6 +34,9 @@ def test_run_waits_for_a_person_until_it_is_done_or_stopped(lab) -> None:
     lab.until(window.question.isVisible)
     for key in (Qt.Key.Key_A, Qt.Key.Key_Space, Qt.Key.Key_Return):
         QTest.keyClick(lab.app.focusWidget(), key)  # of a note that is typed just then
+    lab.until(lambda: window.question.heeds_keys)
+    for key in (Qt.Key.Key_A, Qt.Key.Key_Space, Qt.Key.Key_Return):
+        QTest.keyClick(lab.app.focusWidget(), key)  # nor after a pause in typing it
     assert len(done) == 1 and window.question.isVisible(), "nobody moved the probes"
     for part in (window.question.done, window.question.stop):  # Tab, Enter: Done
         QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Tab)
@@ -41,6 +44,38 @@ def test_run_waits_for_a_person_until_it_is_done_or_stopped(lab) -> None:
     session.run.take(Ended(Ending.refused("stopped at the bench")))
     session.acknowledge()
     assert not window.question.isVisible(), "a run that ended waits for nobody"
+
+
+def test_a_key_pressed_as_the_question_comes_does_not_answer_it(
+    lab, monkeypatch
+) -> None:
+    """Space, meant for Freeze, said that the probes were moved; STOP's keys act."""
+    window, session, done = lab.window, lab.session, []
+    card, stopped = window.question, []
+    window.page.setFocus()
+    session.run.task = RemoteTask(0, lambda *said: done.append(said))
+    session.status.enter(WindowState.RUNNING)
+    session.run.take(PersonAsked("Put the probes on 0 V."))
+    assert card.isVisible() and not card.heeds_keys
+    with monkeypatch.context() as spied:
+        spied.setattr(session, "stop", lambda *reason: stopped.append(reason))
+        for key in (Qt.Key.Key_Escape, Qt.Key.Key_F12):
+            QTest.keyClick(lab.app.focusWidget(), key)
+    assert len(stopped) == 2
+    for key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Tab):
+        QTest.keyClick(lab.app.focusWidget(), key)
+    assert not done and card.isVisible() and card.done.hasFocus()
+    lab.until(lambda: card.heeds_keys)
+    QTest.keyClick(lab.app.focusWidget(), Qt.Key.Key_Space)
+    assert done == [(Engine.say, answer, "")] and not card.isVisible()
+    session.run.take(PersonAsked("The field?", current=0.5))
+    QTest.keyClicks(lab.app.focusWidget(), "12")  # the end of a note
+    assert card.entry.text() == ""
+    lab.until(lambda: card.heeds_keys)
+    QTest.keyClicks(lab.app.focusWidget(), "5.4")
+    assert card.entry.text() == "5.4"
+    session.run.take(Ended(Ending.refused("stopped at the bench")))
+    session.acknowledge()
 
 
 @pytest.fixture
@@ -70,6 +105,7 @@ def test_a_person_reads_the_field_for_a_calibration(calibrating) -> None:
         assert f"holds {show(errand.current, 'A')}" in held
         assert ("heat" in card.coil.text()) is (abs(errand.current) > 0.6)
         assert not card.done.isEnabled(), "nothing is typed yet"
+        lab.until(lambda: card.heeds_keys)
         QTest.keyClicks(card.entry, f"{10.8 * errand.current:.2f}")
         QTest.keyClick(card.entry, Qt.Key.Key_Return)
         lab.until(lambda: session.run.asked or session.state is not WindowState.RUNNING)
@@ -89,6 +125,7 @@ def test_what_is_no_field_is_not_sent_and_what_is_doubted_asked_again(
 ) -> None:
     lab = calibrating
     session, card = lab.session, lab.window.question
+    lab.until(lambda: card.heeds_keys)
     card.entry.setText("10.8 A")
     assert not card.done.isEnabled() and "A" in card.understood.text()
     QTest.keyClick(card.entry, Qt.Key.Key_Return)

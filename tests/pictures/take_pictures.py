@@ -261,7 +261,7 @@ def _read_by_a_person(folder: Path) -> None:
     stage.planned()
     stage.window.setup.start()
     for field in ("10.83", "9.75", "8.66"):
-        stage.until(card.isVisible)
+        stage.until(lambda: card.isVisible() and card.heeds_keys)
         QTest.keyClicks(card.entry, field)
         if field != "8.66":
             QTest.keyClick(card.entry, Qt.Key.Key_Return)
