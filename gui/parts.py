@@ -38,7 +38,7 @@ from gui.look.icons import icon, pixmap
 from gui.look.theme import Theme
 from gui.look.tokens import DARK
 from gui.state import unmarked
-from gui.tab_order import bring_into_sight
+from gui.tab_order import bring_into_sight, take_along
 
 
 def label(text: str, role: str = "", *, wrap: bool = False) -> QLabel:
@@ -167,7 +167,7 @@ class IconButton(QToolButton):
 
 
 class Combo(QComboBox):
-    """A list that drops down; the wheel scrolls what it stands in, never its value.
+    """A list that drops down; wheel and pages scroll what it stands in, not its value.
 
     Nor does the wheel bring it the keyboard: the next letter would choose.
     """
@@ -179,6 +179,13 @@ class Combo(QComboBox):
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Leave the wheel to the page."""
         event.ignore()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Leave page up and down to the page, too."""
+        if event.key() in (Qt.Key.Key_PageUp, Qt.Key.Key_PageDown):
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
 
 
 class Segments(QFrame):
@@ -239,11 +246,14 @@ class _Page(QScrollArea):
                 bring_into_sight(has, self)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Leave to the window what would scroll sideways, where nothing is."""
+        """Take the keyboard along; leave to the window what would scroll sideways."""
         if event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
             event.ignore()
-        else:
-            super().keyPressEvent(event)
+            return
+        before = self.verticalScrollBar().value()
+        super().keyPressEvent(event)
+        if way := self.verticalScrollBar().value() - before:
+            take_along(self, way)
 
 
 def scrolling(inner: QWidget) -> QScrollArea:

@@ -8,8 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from functools import cmp_to_key
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QScrollArea, QWidget
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractSlider,
+    QApplication,
+    QScrollArea,
+    QWidget,
+)
 
 
 def in_reading_order(root: QWidget) -> list[QWidget]:
@@ -64,7 +70,41 @@ def scroll(root: QWidget, way: int) -> None:
         bar = area.verticalScrollBar()
         if area.isVisible() and bar.maximum() > 0:
             bar.setValue(bar.value() + way * bar.pageStep())
+            take_along(area, way)
             return
+
+
+def take_along(area: QScrollArea, way: int) -> None:
+    """Have the keyboard go on to what is in sight, where its place was scrolled away.
+
+    What acts at a key it does not go to: no button, and no slider.
+
+    Args:
+        area: what was scrolled.
+        way: below zero where that was up.
+    """
+    inner, now = area.widget(), QApplication.focusWidget()
+    if inner is None or now is None or not inner.isAncestorOf(now):
+        return
+    height = area.viewport().height()
+
+    def top(one: QWidget) -> int:
+        return one.mapTo(area.viewport(), QPoint()).y()
+
+    if 0 <= top(now) <= height - now.height():
+        return
+    order = [one for one in in_reading_order(inner) if not _acts(one)]
+    ahead = [one for one in order if top(one) >= 0]
+    if way < 0:
+        order.reverse()
+        ahead = [one for one in order if top(one) <= height - one.height()]
+    for one in (*ahead, *order[-1:])[:1]:
+        reach(one, forward=way > 0)
+
+
+def _acts(one: QWidget) -> bool:
+    presses = isinstance(one, QAbstractButton) and not one.isCheckable()
+    return presses or isinstance(one, QAbstractSlider)
 
 
 def _takes_keyboard(widget: QWidget) -> bool:

@@ -45,6 +45,8 @@ class RunCard(QFrame):
     menu_asked = Signal(object, object)
     stepped = Signal(int)
     """The keyboard goes to the run below (1) or above (-1)."""
+    paged = Signal(int)
+    """The same by as many as are seen."""
 
     def __init__(self, entry: RunSummary, theme: Theme, apart: str = "") -> None:
         super().__init__()
@@ -137,13 +139,15 @@ class RunCard(QFrame):
         self.menu_asked.emit(self.entry, event.globalPos())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Open with Enter, tick with Space, go on with up and down."""
+        """Open with Enter, tick with Space, go on with arrows and pages."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.opened.emit(self.entry)
         elif event.key() == Qt.Key.Key_Space:
             self.tick.toggle()
         elif event.key() in (Qt.Key.Key_Up, Qt.Key.Key_Down):
             self.stepped.emit(1 if event.key() == Qt.Key.Key_Down else -1)
+        elif event.key() in (Qt.Key.Key_PageUp, Qt.Key.Key_PageDown):
+            self.paged.emit(1 if event.key() == Qt.Key.Key_PageDown else -1)
         else:
             super().keyPressEvent(event)
 

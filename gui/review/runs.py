@@ -97,7 +97,7 @@ class RunsView(QWidget):
         self.compare = push("Compare")
         head = row((self.search, 1), self.refresh, spacing=4)
         top = row(self.order, STRETCH, self._count)
-        page = with_gutter(scrolling(inner), self._rows)
+        self._page = page = with_gutter(scrolling(inner), self._rows)
         first = row((self.open, 3), (self.recover, 3), (self.about, 2), spacing=6)
         parts = (head, self.filter, top, page, first, self.rerun, self.compare)
         stack(self, parts, page)
@@ -225,6 +225,7 @@ class RunsView(QWidget):
         card.ticked.connect(self._buttons)
         card.menu_asked.connect(self._show_menu)
         card.stepped.connect(partial(self._step, card))
+        card.paged.connect(partial(self._step_pages, card))
         return card
 
     def _go_to_list(self) -> None:
@@ -234,10 +235,14 @@ class RunsView(QWidget):
             reach(card)
 
     def _step(self, card: RunCard, way: int) -> None:
-        """Give the keyboard to the run below (1) or above (-1)."""
+        """Give the keyboard to a run so many below, or above (below zero)."""
         at = self.cards.index(card) + way
-        if 0 <= at < len(self.cards):
-            reach(self.cards[at])
+        reach(self.cards[min(max(at, 0), len(self.cards) - 1)])
+
+    def _step_pages(self, card: RunCard, way: int) -> None:
+        """Give the keyboard to a run as many below (1) or above (-1) as are seen."""
+        seen = self._page.viewport().height() // card.height()
+        self._step(card, way * max(seen, 1))
 
     def _nothing(self) -> QWidget:
         text = (

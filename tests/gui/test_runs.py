@@ -220,6 +220,23 @@ def test_arrows_go_from_run_to_run_and_tab_comes_to_one(runs: RunsView, qtbot) -
     qtbot.waitUntil(runs.cards[0].hasFocus)
 
 
+def test_pages_go_from_run_to_run(runs: RunsView, qtbot) -> None:
+    """They scrolled the chosen run out of sight, which had the keyboard."""
+    many = [replace(ENTRIES[0], folder=Path(f"{n}"), name=f"{n}") for n in range(30)]
+    runs.show_entries(many)
+    runs.resize(360, 600)
+    focused(runs, qtbot, 0)
+    end = len(runs.cards) - 1
+    for key, last in ((Qt.Key.Key_PageDown, end), (Qt.Key.Key_PageUp, 0)):
+        at = [card.hasFocus() for card in runs.cards].index(True)
+        while at != last:
+            QTest.keyClick(runs.cards[at], key)
+            before, at = at, [card.hasFocus() for card in runs.cards].index(True)
+            assert 1 < abs(at - before) < 8 or at == last, "as many as are seen"
+            seen = runs.cards[at].visibleRegion().boundingRect()
+            assert seen == runs.cards[at].rect()
+
+
 def test_runs_of_a_protocol_say_in_what_they_differ(runs: RunsView) -> None:
     """Their names and pictures are alike."""
     said = {"a": "80 mN", "b": "120 mN"}

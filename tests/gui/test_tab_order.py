@@ -1,8 +1,9 @@
 """Tab goes through the window as one reads it, whatever was made when."""
 
+import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QPushButton, QWidget
 
 from gui.dialogs.about_run import AboutRun
 from gui.dialogs.connect import Connect
@@ -88,6 +89,49 @@ def test_a_field_stays_in_sight_as_what_it_says_is_told(lab) -> None:
     lab.until(lambda: area.height() < height)
     assert seen.visibleRegion().boundingRect() == seen.rect()
     window.setup._show_warnings(())
+    window.resize(1720, 1080)
+    window.page.setFocus()
+
+
+@pytest.mark.parametrize("size", [(1366, 728), (845, 493)])
+def test_pages_take_the_keyboard_along(lab, size: tuple[int, int]) -> None:
+    """It stayed in a field that was scrolled away; in a choice they chose another."""
+    window, form = lab.window, lab.window.setup.form
+    window.resize(*size)
+    lab.app.processEvents()
+    area = window.setup.tables.parentWidget().parentWidget().parentWidget()
+    bar, texts = area.verticalScrollBar(), form.texts()
+    reach(form.fields[0].focusProxy())
+    for key in (Qt.Key.Key_PageDown, Qt.Key.Key_PageUp):
+        before, places = None, []
+        while bar.value() != before:
+            before = bar.value()
+            places.append(press(lab, key))
+            assert area.isAncestorOf(places[-1])
+            seen = places[-1].visibleRegion().boundingRect()
+            assert seen == places[-1].rect(), places[-1].accessibleName()
+        assert len({*places}) > 1, "page by page"
+    assert places[-1] in [field.focusProxy() for field in form.fields], "at its start"
+    assert form.texts() == texts
+    window.resize(1720, 1080)
+    window.page.setFocus()
+
+
+def test_pages_scroll_past_what_presses_and_moves_something(lab) -> None:
+    """The keyboard would come to the slider of the coil, which the next page moves."""
+    window = lab.window
+    window.resize(845, 493)
+    window.fold(window.review, False)
+    window.review.show_tab(2)
+    manual = window.review.manual
+    manual.begin.setFocus()
+    for _ in range(4):
+        has = press(lab, Qt.Key.Key_PageDown)
+        assert has is not manual.slider
+        assert has is manual.begin or not isinstance(has, QPushButton)
+    window.review.show_tab(0)
+    window.fold(window.setup, False)
+    window._folds = dict.fromkeys(window._folds)  # nobody has folded one by hand
     window.resize(1720, 1080)
     window.page.setFocus()
 
