@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
+    QAbstractItemDelegate,
     QAbstractItemView,
     QHeaderView,
     QStackedWidget,
@@ -47,6 +49,26 @@ from tactile_lab.table import dumped, fields_of
 PAGES = ("Notes", "Facts", "Settings", "Log")
 
 
+class NotesTable(QTableWidget):
+    """Time and text of each note; Tab goes on from its last cell, back from its first.
+
+    Qt would go round and round among them while one of them is typed into.
+    """
+
+    def closeEditor(
+        self, editor: QWidget, hint: QAbstractItemDelegate.EndEditHint
+    ) -> None:
+        """End the typing in a cell."""
+        hints, at = QAbstractItemDelegate.EndEditHint, self.currentIndex()
+        end = self.model().index(self.rowCount() - 1, 1)
+        forward = hint == hints.EditNextItem
+        leaves = forward and at == end
+        leaves |= hint == hints.EditPreviousItem and at == self.model().index(0, 0)
+        super().closeEditor(editor, hints.NoHint if leaves else hint)
+        if leaves:
+            self.focusNextPrevChild(forward)
+
+
 class AboutRun(Overlay):
     """A card for one run after the other."""
 
@@ -69,10 +91,11 @@ class AboutRun(Overlay):
         self.choice = Segments(list(PAGES), "Page")
         self.pages = QStackedWidget()
         self.give_room(self.pages, 330)
-        self.notes = QTableWidget(0, 2)
+        self.notes = NotesTable(0, 2)
         self._set_up_notes()
         self.add = push("Add a note")
-        self.remove = push("Take it out", tip="The chosen note")
+        self.remove = push("Take it out", tip="The chosen note (Delete)")
+        self.remove.setEnabled(False)
         buttons = row(self.add, self.remove, STRETCH)
         notes = QWidget()
         column(notes, (self.notes, 1), buttons, spacing=8)
@@ -88,8 +111,12 @@ class AboutRun(Overlay):
         self._lay_out()
         self.choice.group.idClicked.connect(self.show_page)
         self.add.clicked.connect(lambda: self._add_row(Note(text="", at="")))
-        self.remove.clicked.connect(
-            lambda: self.notes.removeRow(self.notes.currentRow())
+        self.remove.clicked.connect(self._take_out)
+        delete = QShortcut(QKeySequence("Delete"), self.notes)
+        delete.setContext(Qt.ShortcutContext.WidgetShortcut)
+        delete.activated.connect(self._take_out)
+        self.notes.currentCellChanged.connect(
+            lambda row, *_: self.remove.setEnabled(row >= 0)
         )
         self.save.clicked.connect(self._save)
         self.close_button.clicked.connect(self.hide)
@@ -128,6 +155,7 @@ class AboutRun(Overlay):
         self.notes.setRowCount(0)
         for note in said.notes:
             self._add_row(note)
+        self.notes.setCurrentCell(0 if said.notes else -1, 1)
         self._as_read, self._shown = said, self._typed()
 
     def _typed(self) -> tuple[object, ...]:
@@ -215,6 +243,14 @@ class AboutRun(Overlay):
         if not note.text:
             self.notes.setCurrentCell(at, 1)
             self.notes.edit(self.notes.currentIndex())
+
+    def _take_out(self) -> None:
+        """Take out the chosen note; the keyboard goes to what is chosen then.
+
+        Left on the button, it would take out another with a second Enter.
+        """
+        self.notes.removeRow(self.notes.currentRow())
+        (self.notes if self.notes.rowCount() else self.add).setFocus()
 
     def _set_up_notes(self) -> None:
         self.notes.setAccessibleName("Notes")

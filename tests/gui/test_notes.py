@@ -217,6 +217,56 @@ def test_name_tags_and_notes_are_edited_on_the_card(lab) -> None:
     lab.until(lambda: "The good one" in [c.entry.title for c in runs.cards])
 
 
+def press(lab, *keys: Qt.Key) -> None:
+    for key in keys:
+        QTest.keyClick(lab.app.focusWidget(), key)
+        lab.app.processEvents()
+
+
+def test_notes_are_taken_out_with_the_keyboard(lab) -> None:
+    """A second Enter took out one more, and the last left the keyboard on nothing."""
+    folder, card = lab.complete_run(), lab.window.runs.card
+    for text in ("one", "two", "three"):
+        add_note(folder, text)
+    card.show_run(folder)
+    notes, left = card.notes, ["one", "two", "three"]
+
+    def standing() -> list[str]:
+        return [notes.item(at, 1).text() for at in range(notes.rowCount())]
+
+    assert standing() == left and notes.selectedItems(), "one sees which is chosen"
+    press(lab, *[Qt.Key.Key_Tab] * 3)
+    assert notes.hasFocus()
+    press(lab, Qt.Key.Key_Down, Qt.Key.Key_Tab, Qt.Key.Key_Tab)
+    assert card.remove.hasFocus()
+    press(lab, Qt.Key.Key_Return, Qt.Key.Key_Return)
+    assert standing() == ["one", "three"] and notes.hasFocus()
+    assert notes.selectedItems()[0].text() == "three"
+    press(lab, Qt.Key.Key_Delete, Qt.Key.Key_Delete)
+    assert standing() == [] and card.add.hasFocus() and not card.remove.isEnabled()
+    card.save.click()
+    assert not read_remarks(folder).notes
+
+
+def test_tab_leads_out_of_a_note_that_is_typed(lab) -> None:
+    """From the last cell it went on to the first one, round and round."""
+    card = lab.window.runs.card
+    card.show_run(lab.complete_run())
+    for keys, to in (
+        ([Qt.Key.Key_Tab], card.add),
+        ([Qt.Key.Key_Backtab] * 2, card.star),
+    ):
+        card.add.setFocus()
+        press(lab, Qt.Key.Key_Space)
+        QTest.keyClicks(lab.app.focusWidget(), "seen")
+        press(lab, *keys)
+        assert to.hasFocus() and card.notes.item(0, 1).text() == "seen"
+        press(lab, Qt.Key.Key_Escape)
+        card.show_run(card._folder)
+        card.notes.setRowCount(0)
+    card.hide()
+
+
 def test_a_note_that_came_while_the_card_was_open_is_kept(lab) -> None:
     """As by the command line, or from a second window."""
     card, folder = lab.window.runs.card, lab.runs(1)[0]
