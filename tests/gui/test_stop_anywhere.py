@@ -16,6 +16,7 @@ from shiboken6 import isValid
 from gui.ask_file import ask_file
 from gui.dialogs.overlay import Overlay
 from gui.state import WindowState
+from gui.tab_order import in_reading_order
 
 
 def seen_within(box_opens) -> dict[str, object]:
@@ -173,6 +174,26 @@ def test_esc_closes_the_uppermost_first(lab) -> None:
     QTest.keyClick(window.windowHandle(), Qt.Key.Key_Escape)
     assert not card.isVisible()
     assert len(log.lines) == before, "nothing was switched off"
+
+
+def test_esc_in_the_header_is_as_anywhere(lab, monkeypatch) -> None:
+    """Within the header it closes the card below; where none is open it is STOP."""
+    window, stopped = lab.window, []
+    window.fold(window.setup, True)  # which adds a button
+    controls = in_reading_order(window.header)
+    assert window.header.stop in controls and len(controls) > 4
+    with monkeypatch.context() as spied:
+        spied.setattr(lab.session, "stop", stopped.append)
+        for number, control in enumerate(controls):
+            window.actions_.show_help()
+            control.setFocus(Qt.FocusReason.TabFocusReason)
+            QTest.keyClick(control, Qt.Key.Key_Escape)
+            assert not any(card.isVisible() for card in window.findChildren(Overlay))
+            assert len(stopped) == number and control.hasFocus()
+            QTest.keyClick(control, Qt.Key.Key_Escape)
+            assert stopped[number:] == ["STOP by Esc"]
+    window.fold(window.setup, False)
+    window._folds = dict.fromkeys(window._folds)  # nobody has folded one by hand
 
 
 def test_stop_acts_while_qt_waits_for_an_answer(lab) -> None:
