@@ -246,13 +246,15 @@ class _Page(QScrollArea):
                 bring_into_sight(has, self)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Take the keyboard along; leave to the window what would scroll sideways."""
-        if event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
+        """Take the keyboard along; leave to others what would scroll nothing here."""
+        bar = self.verticalScrollBar()
+        sideways = event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right)
+        if sideways or not bar.maximum():
             event.ignore()
             return
-        before = self.verticalScrollBar().value()
+        before = bar.value()
         super().keyPressEvent(event)
-        if way := self.verticalScrollBar().value() - before:
+        if way := bar.value() - before:
             take_along(self, way)
 
 

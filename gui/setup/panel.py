@@ -41,8 +41,9 @@ from gui.tab_order import reach
 from tactile_lab.engine.request import Request
 from tactile_lab.errors import TactileLabError
 
-LOW = 660
-"""Height of the panel, px, below which the queue shows less of fewer runs."""
+LOW, TIGHT = 660, 570
+"""Heights of the panel, px, below which the queue shows less of fewer runs, and scrolls
+with the form: it stood over the form's fields and buttons."""
 
 NAMED = 4
 """Changed parameters in the name of a run."""
@@ -179,7 +180,13 @@ class SetupPanel(QFrame):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Show as much of the queue as leaves room for the form."""
         super().resizeEvent(event)
-        self.queue.show_room(low=self.height() <= LOW)
+        tight = self.height() <= TIGHT
+        self.queue.show_room(low=self.height() <= LOW, scrolls=tight)
+        self._hint.setVisible(not tight)
+        if tight and self._inside.indexOf(self.queue) < 0:
+            self._inside.insertWidget(0, self.queue)
+        elif not tight and self._whole.indexOf(self.queue) < 0:
+            self._whole.addWidget(self.queue, self._queue_at, 0)
 
     def edit(self, item: Queued) -> None:
         """Take up a waiting run's parameters into the form."""
@@ -392,8 +399,8 @@ class SetupPanel(QFrame):
         force = (self.about, caption, self.preview)
         rests_on = (label("NUMBERS REST ON", "section"), self.rests_on)
         asked = (title, self.form, self.tables, *rests_on)
-        inside = column(inner, *force, *asked, STRETCH, spacing=9)
-        return with_gutter(scrolling(inner), inside)
+        self._inside = column(inner, *force, *asked, STRETCH, spacing=9)
+        return with_gutter(scrolling(inner), self._inside)
 
     def _lay_out(self) -> None:
         self.help = IconButton(self._theme, "help", "Help on this panel")
@@ -405,6 +412,7 @@ class SetupPanel(QFrame):
         head = row(title, STRETCH, self.star, self._open, self._reset, self.help)
         self.problem.hide()
         page = self._page()
+        self._hint = label("Drop a <b>scene</b> or a <b>run</b> anywhere", "small")
         parts = (
             head,
             self.picker,
@@ -416,10 +424,11 @@ class SetupPanel(QFrame):
             line(),
             self.estimate,
             self.buttons,
-            label("Drop a <b>scene</b> or a <b>run</b> anywhere", "small"),
+            self._hint,
         )
-        whole = stack(self, parts, page)
-        whole.setContentsMargins(14, 10, 14 - SCROLL_BAR, 12)
+        self._queue_at = parts.index(self.queue)
+        self._whole = stack(self, parts, page)
+        self._whole.setContentsMargins(14, 10, 14 - SCROLL_BAR, 12)
 
 
 def _listed(texts: Sequence[str]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent
 from PySide6.QtWidgets import QApplication, QFrame, QWidget
@@ -21,6 +23,7 @@ from gui.parts import (
 from gui.session.queue import Queued
 from gui.setup.estimate import words_of
 from gui.state import minutes
+from gui.tab_order import reach
 
 BUTTON = 30
 ROW, LINE = 59, 39
@@ -114,7 +117,7 @@ class QueueView(QWidget):
         super().__init__()
         self._theme = theme
         self.cards: list[QueueCard] = []
-        self._low = True
+        self._low, self._all = True, False
         self._sum = label("", "small")
         head = row(label("QUEUE", "section"), STRETCH, self._sum)
         tip = "Run one after the other (Ctrl+Shift+Return)"
@@ -160,10 +163,15 @@ class QueueView(QWidget):
         if focus is not None and self.cards:
             self._give_focus(*focus)
 
-    def show_room(self, *, low: bool) -> None:
-        """Show less of each run where there is little room."""
-        if low != self._low:
-            self._low = low
+    def show_room(self, *, low: bool, scrolls: bool = False) -> None:
+        """Show less of each run where there is little room.
+
+        Args:
+            low: without its cost, and few of them.
+            scrolls: all of them: what it stands in scrolls.
+        """
+        if (low, scrolls) != (self._low, self._all):
+            self._low, self._all = low, scrolls
             self._fit()
             for card in self.cards:
                 if card.editing:
@@ -173,14 +181,15 @@ class QueueView(QWidget):
         for card in self.cards:
             card.show_room(low=self._low)
         height, most = (LINE, MOST_LOW) if self._low else (ROW, MOST)
-        self._area.setFixedHeight(height * min(len(self.cards), most))
+        count = len(self.cards)
+        self._area.setFixedHeight(height * (count if self._all else min(count, most)))
 
     def focus_on(self, item: Queued) -> None:
         """Give a waiting run the keyboard."""
         for card in self.cards:
             if card.item is item:
                 card.setFocus()
-                self._reveal(card)
+                QTimer.singleShot(0, card, partial(reach, card))  # has its place then
 
     def _reveal(self, card: QueueCard) -> None:
         """Scroll to a row, once it has its place."""

@@ -1,11 +1,12 @@
 """Cards and bars in a window as small as a screen of 1280 x 720 at 150 % leaves."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import QSize
+from PySide6.QtCore import QPoint, QSize, Qt
 from PySide6.QtWidgets import (
     QAbstractButton,
     QLabel,
@@ -26,6 +27,7 @@ from gui.record.progress import ProgressStrip
 from gui.screen.centre import EmptyCard
 from gui.screen.compare_bar import CompareBar
 from gui.state import Snapshot
+from gui.tab_order import reach
 from gui.within_reach import FRAME
 from tactile_lab.engine.sensor import SensorState
 
@@ -212,3 +214,54 @@ def test_what_the_plan_warns_of_is_seen_below_a_long_form(lab, small, tmp_path) 
     lab.app.processEvents()
     assert told.visibleRegion().boundingRect() == told.rect(), "all of it is in sight"
     assert cut(window.setup) == []
+
+
+def squeezed(panel: QWidget) -> list[str]:
+    """Parts of a panel that are lower than they can be, or lie over each other."""
+    kind = Qt.FindChildOption.FindDirectChildrenOnly
+    parts = [
+        one for one in panel.findChildren(QWidget, options=kind) if one.isVisible()
+    ]
+    found = []
+    for one in parts:
+        least = one.minimumSizeHint().height()
+        if isinstance(one, QLabel) and one.wordWrap():
+            least = one.heightForWidth(one.width())
+        others = [x for x in parts if x.geometry().intersects(one.geometry())]
+        if one.height() < least or others != [one]:
+            found.append(f"{type(one).__name__} {one.geometry()}, least {least}")
+    return found
+
+
+def comes_into_sight(one: QWidget) -> bool:
+    """Whether all of it is seen once it has the keyboard."""
+    reach(one)
+    return one.visibleRegion().boundingRect() == one.rect()
+
+
+def test_what_waits_leaves_form_and_buttons_whole(lab, small, tmp_path) -> None:
+    """The queue stood over fields and buttons, and they over each other."""
+    window, session = lab.window, lab.session
+    setup, queue = window.setup, window.setup.queue
+    scene = tmp_path / "sparse.toml"
+    scene.write_text(
+        '[protocol]\nname = "pulses"\n[record]\nsample_rate = "100 kS/s"\n'
+    )
+    window.screen_.open_scene(str(scene))
+    session.plan.expectation = None
+    lab.until(lambda: session.plan.expectation is not None)
+    for _ in range(3):
+        setup.enqueue()
+    for size in (SMALL, QSize(1280, 800) / 1.5 - FRAME):
+        window.resize(size)
+        for edits in (False, True):
+            if edits:
+                setup.edit(session.queue.items[0])
+            lab.until(setup.warnings.isVisible)
+            lab.until(lambda: squeezed(setup) + squeezed(setup.form) == [], longest=5)
+            for one in (*queue.cards, queue.resume, setup.form.fields[0].focusProxy()):
+                lab.until(partial(comes_into_sight, one), longest=5)
+        setup.cancel()
+    window.resize(USUAL)
+    lab.app.processEvents()
+    assert queue.mapTo(setup, QPoint()).y() > setup.form.mapTo(setup, QPoint()).y()
