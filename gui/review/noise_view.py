@@ -7,7 +7,16 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QWidget
 
 from gui.look.theme import Theme
-from gui.parts import SCROLL_BAR, STRETCH, Segments, column, label, row
+from gui.parts import (
+    STRETCH,
+    Segments,
+    column,
+    label,
+    row,
+    scrolling,
+    stack,
+    with_gutter,
+)
 from gui.plots.numbers import unbroken
 from gui.plots.small_plot import SmallPlot
 from gui.session.session import Session
@@ -45,8 +54,10 @@ class NoiseView(QWidget):
         self.plot.setMaximumHeight(HIGHEST)
         self.said = label("", "", wrap=True)
         head = row(title, STRETCH, self.signals)
-        parts = head, (self.plot, 1), self.said, STRETCH
-        column(self, *parts, spacing=9).setContentsMargins(0, 0, SCROLL_BAR, 0)
+        inner = QWidget()
+        parts = (self.plot, 1), self.said, STRETCH
+        page = with_gutter(scrolling(inner), column(inner, *parts, spacing=9))
+        stack(self, (head, page), page, spacing=9)
         self.signals.group.idClicked.connect(self._ask)
         timer = QTimer(self)
         timer.timeout.connect(self._ask)

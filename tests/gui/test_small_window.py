@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QSize, Qt
 from PySide6.QtWidgets import (
@@ -24,11 +25,13 @@ from gui.lanes.tools import Tools
 from gui.look.theme import Theme
 from gui.record.monitor_bar import MonitorBar
 from gui.record.progress import ProgressStrip
+from gui.review.noise_view import NoiseView
 from gui.screen.centre import EmptyCard
 from gui.screen.compare_bar import CompareBar
 from gui.state import Snapshot
 from gui.tab_order import reach
 from gui.within_reach import FRAME
+from tactile_lab.analysis.noise import noise
 from tactile_lab.engine.sensor import SensorState
 
 SMALL, USUAL = QSize(853, 480) - FRAME, QSize(1720, 1080)
@@ -265,3 +268,20 @@ def test_what_waits_leaves_form_and_buttons_whole(lab, small, tmp_path) -> None:
     window.resize(USUAL)
     lab.app.processEvents()
     assert queue.mapTo(setup, QPoint()).y() > setup.form.mapTo(setup, QPoint()).y()
+
+
+def test_all_lines_of_the_mains_can_be_read(app) -> None:
+    """What is said of them stood over the plot, and its end below the panel."""
+    time = np.arange(0.0, 4.0, 1e-4)
+    hum = [np.sin(2 * np.pi * 50 * n * time) / n for n in range(1, 11)]
+    seen = np.sum(hum, axis=0) + np.random.default_rng(1).normal(0, 0.01, time.size)
+    view = NoiseView(Theme("light"))
+    view.resize(308, 340)
+    view.show()
+    view.show_noise("V_C1", noise(seen, 1e-4))
+    for _ in range(4):
+        app.processEvents()
+    assert "500\u00a0Hz" in view.said.text()
+    assert squeezed(view) == []
+    assert squeezed(view.said.parentWidget()) == []
+    view.close()
