@@ -412,6 +412,7 @@ class LaneBox(pg.ViewBox):  # type: ignore[misc]
             if step.start < frame.end and frame.start < step.end:
                 at = QPointF(max(frame.left, frame.x1(step.start)) + 5, 9)
                 text = f"no rate: {why.partition(';')[0]}"
+                text = paint.shortened(text, frame.right - at.x() - 3)
                 paint.write_on(painter, at, text, ink, on.tokens.plot)
                 break
         if laws:

@@ -1,5 +1,8 @@
 """What lanes paint: on the screen, into files, and where painting fails."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from lane_stack import box, settle
@@ -21,13 +24,7 @@ def test_the_same_picture_on_screen_in_png_and_in_svg(app, stack, tokens, tmp_pa
     painter = QPainter(pictures["png"])
     stack.scene.draw_onto(painter, target, tokens)
     painter.end()
-    generator = QSvgGenerator()
-    generator.setFileName(str(tmp_path / "lanes.svg"))
-    generator.setSize(size)
-    generator.setViewBox(target)
-    painter = QPainter(generator)
-    stack.scene.draw_onto(painter, target, tokens)
-    painter.end()
+    draw_svg(stack, tmp_path / "lanes.svg")
     pictures["svg"] = QImage(size, QImage.Format.Format_RGB32)
     painter = QPainter(pictures["svg"])
     QSvgRenderer(str(tmp_path / "lanes.svg")).render(painter, target)
@@ -36,6 +33,16 @@ def test_the_same_picture_on_screen_in_png_and_in_svg(app, stack, tokens, tmp_pa
     assert np.array_equal(grey["screen"], grey["png"])
     assert np.mean(np.abs(grey["svg"] - grey["screen"]) > 40) < 0.02
     assert grey["screen"].std() > 3
+
+
+def draw_svg(stack, file: Path) -> None:
+    generator, target = QSvgGenerator(), QRectF(stack.scene.rect())
+    generator.setFileName(str(file))
+    generator.setSize(stack.scene.size())
+    generator.setViewBox(target)
+    painter = QPainter(generator)
+    stack.scene.draw_onto(painter, target, stack.stage.tokens)
+    painter.end()
 
 
 def pixels(image: QImage) -> np.ndarray:
@@ -73,3 +80,21 @@ def test_a_stretch_beyond_the_range_is_shaded(app, stack, monkeypatch):
         lane = box(stack, key)
         at = QPoint(round(stack.stage.whole().x1(8.0)), round(lane.y() + 4))
         assert (seen.pixelColor(at) != bare.pixelColor(at)) is marked, key
+
+
+@pytest.mark.parametrize(("width", "whole"), [(900, True), (460, False)])
+def test_why_there_is_no_rate_ends_with_the_lane(
+    app, stack, tmp_path, width: int, whole: bool
+) -> None:
+    """It ended in the middle of a word at the lane's right edge."""
+    source = stack.source
+    source.shortest_interval = 2.0
+    source.add_spikes(tuple(20.0 + at for at in range(5)))
+    assert source.unrated
+    stack.resize(width, 600)
+    stack.view.show_span(10.0, 10.0)
+    settle(app)
+    draw_svg(stack, tmp_path / "lanes.svg")
+    written = re.findall(r">([^<>]*)</text>", (tmp_path / "lanes.svg").read_text())
+    (said,) = (text for text in written if text.startswith("no rate"))
+    assert said.endswith("can fire" if whole else "…")
