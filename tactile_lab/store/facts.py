@@ -125,11 +125,16 @@ def _parameter(key: str, value: Any) -> Iterator[Fact]:
 
 
 def of_results(results: Mapping[str, Any]) -> Iterator[Fact]:
-    """The numbers that a run's results.json concludes, and those of its trials."""
+    """The numbers that a run's results.json concludes, and those of its whole trials.
+
+    A trial that was cut short has numbers of the part before, which compare with none.
+    """
     concluded = list(_numbers(results.get("conclusion") or {}))
     yield from concluded
     told = {fact.key for fact in concluded}
     for trial in results.get("trials") or []:
+        if trial.get("complete") is False:
+            continue
         for key, table, name in _OF_TRIALS:
             if key not in told:
                 found = trial if not table else trial.get(table) or {}

@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from tactile_lab.cli import cli
 from tactile_lab.errors import RunFolderError, SceneError
 from tactile_lab.store.catalogue import Catalogue
-from tactile_lab.store.facts import of_results
+from tactile_lab.store.facts import grouped, of_results
 from tactile_lab.store.folder import RunFolder, read_info, write_json
 from tactile_lab.store.index import FILE as INDEX
 from tactile_lab.store.remarks import add_note
@@ -139,6 +139,16 @@ def test_what_a_protocol_concludes_stands_for_its_trials_and_is_a_number():
     told = of_results({"conclusion": concluded, "trials": [trial, trial]})
     found = [(fact.key, fact.number, fact.unit) for fact in told]
     assert found == [("tau", 3.0, "s"), *[("rest_V_C1", 4.3, "V")] * 2]
+
+
+def test_a_trial_that_was_cut_short_gives_no_number_to_compare():
+    """A chart and a page of runs counted it, and did not say so."""
+    whole = {"complete": True, "peak_rate_Hz": 20.0, "latency_s": 0.2}
+    cut = {"complete": False, "peak_rate_Hz": 3.0, "latency_s": 0.1}
+    cut["adaptation"] = {"time_constant_s": {"value": 1.0}}
+    found = grouped(of_results({"trials": [whole, cut]}))
+    told = {key: [fact.number for fact in facts] for key, facts in found.items()}
+    assert told == {"peak_rate": [20.0], "first_spike": [0.2]}
 
 
 @pytest.mark.parametrize(
