@@ -176,9 +176,20 @@ class Intake:
         return taken
 
     def spikes_between(self, start: float, end: float) -> FloatArray:
-        """Times of remembered spikes in [start, end) s on the run's axis."""
-        times = self._spike_times
+        """Times of remembered spikes in [start, end) s on the run's axis.
+
+        One that has begun and is not over is among them.
+        """
+        times = self._spike_times + self._begun
         return np.array(times[bisect_left(times, start) : bisect_left(times, end)])
+
+    @property
+    def _begun(self) -> list[float]:
+        """Time of the spike that is not yet over, s, if there is one."""
+        if self._detector is None or self._stream is None:
+            return []
+        sample = self._detector.begun
+        return [] if sample is None else [self._start + sample * self._stream.interval]
 
     def forget_spikes_before(self, time: float) -> None:
         """Let go of spikes that no trial to come can ask for."""

@@ -114,6 +114,11 @@ class Detector:
             return np.empty(0, dtype=SPIKE)
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
+    @property
+    def begun(self) -> float | None:
+        """Sample at which the spike began that is not yet over; None: there is none."""
+        return float(self._times[UP]) if self._state[MODE] == INSIDE else None
+
     def flush(self) -> Spikes:
         """The spike still open, if any, with width NaN; then start anew."""
         pending = np.empty(int(self._state[MODE] == INSIDE), dtype=SPIKE)
@@ -173,6 +178,11 @@ class ResetDetector:
         self._tail = joined[-self._span :].copy()
         self._next = first + codes.size
         return np.concatenate(parts) if parts else np.empty(0, dtype=SPIKE)
+
+    @property
+    def begun(self) -> float | None:
+        """Sample at which the reset began that is not yet over; None: there is none."""
+        return self._inner.begun
 
     def flush(self) -> Spikes:
         """The reset still open, if any; then start anew."""

@@ -296,17 +296,18 @@ class StoredRun:
 
         One that was cut short, or goes on, is not `complete` and ends where the run was
         stopped; so does its hold, if it was reached. The fall after it is no trial's.
+        Its spikes are those found by now: the last may have been over after its end.
         """
         rows = self.records("trials")
         for number in np.flatnonzero(~ended(rows)):
             row = rows[number]
             row["end"] = min(row["end"], self.duration, self.stopped)
-            length, times = row["end"] - row["start"], self.spikes["time"]
-            inside = (times >= row["start"]) & (times < row["end"])
-            row["spikes"] = np.count_nonzero(inside)
-            row["hold_end"] = min(row["hold_end"], length)
+            row["hold_end"] = min(row["hold_end"], row["end"] - row["start"])
             if not row["hold_start"] < row["hold_end"]:
                 row["hold_start"] = row["hold_end"] = np.nan
+        times = self.spikes["time"]
+        first, stop = (np.searchsorted(times, rows[side]) for side in ("start", "end"))
+        rows["spikes"] = stop - first
         return rows
 
     @property

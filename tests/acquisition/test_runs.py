@@ -98,6 +98,29 @@ def test_each_spike_is_told_with_the_rate_it_brings(run_scene, short):
     np.testing.assert_allclose(rates[1:], 1 / np.diff(times))
 
 
+def test_a_spike_that_is_over_after_its_trial_counts_in_it(run_scene):
+    """It was found when that trial was counted, and so in none."""
+    pressed = ", ".join(['"20 mN"'] * 50)
+    ran = run_scene(
+        f"protocol.levels=[{pressed}]",
+        *("protocol.ramp=0 s", "protocol.hold=0.05 s", "protocol.rest=0.05 s"),
+        *("sensor.V_GS=1.58 V", 'record.signals=["V_C2", "spikes"]'),
+        "record.sample_rate=1 kS/s",
+        'bench.scope.channels=[{signal="V_C2", input="B", range="2 V", '
+        'offset="-1.7 V"}]',
+    )
+    told = [e.outcome for e in ran.told if isinstance(e, events.TrialEnded)]
+    with ran.stored() as run:
+        times, trials = run.spikes["time"], run.trials
+        inside = [
+            np.count_nonzero((times >= one["start"]) & (times < one["end"]))
+            for one in trials
+        ]
+        assert sum(inside) > 40
+        assert trials["spikes"].tolist() == inside
+    assert [outcome.spike_times.size for outcome in told] == inside
+
+
 def test_too_slow_sampling_loses_spikes(run_scene, short):
     fast = run_scene(*short)
     slow = run_scene(*short, "record.sample_rate=0.2 MS/s")

@@ -184,7 +184,7 @@ def test_a_trial_has_one_row_from_its_begin_on(bench, recorder, folder):
         assert run.duration == pytest.approx(4.0)
         assert run.trials["end"] == pytest.approx([2.5, 4.0])
         assert run.trials["hold_end"] == pytest.approx([2.25, 1.5])
-        assert run.trials["spikes"].tolist() == [0, 2]
+        assert run.trials["spikes"].tolist() == [3, 2]
 
 
 def test_alignment_moves_the_segment(bench, recorder, folder):
