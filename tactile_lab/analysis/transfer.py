@@ -15,9 +15,17 @@ from tactile_lab.errors import NotIdentifiableError, ParameterError
 FEWEST = 6
 SUBTHRESHOLD_END = 2.75
 ABOVE_FLOOR = 5.0
-"""A point counts from this many times the leakage floor up."""
+"""A point tells the line from this many times the leakage floor up."""
 LEAST = 1e-12
 """Scatter of ln I_DS below which it is but rounding."""
+ROUNDS = 30
+"""So often, at most, points are weighed by what the fit before left of them."""
+PAIRS = 100
+"""Ratios of an ammeter's noise to what grows with the current that are tried."""
+LARGEST = 300.0
+"""Of the logarithm of a current that is tried."""
+SURE = 3.84
+"""Twice the logarithm of how much likelier noise must make what is left: 95 %."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +33,8 @@ class Transfer:
     """A fitted subthreshold line, Eq. (1) with V_DS far above V_T.
 
     Where no range was asked for, what leaks beside it, or the ammeter is off by, was
-    fitted with it: five times above its floor, leakage is still a fifth of the current.
+    fitted with it, to all points below threshold: five times above its floor, leakage
+    is still a fifth of the current.
 
     Attributes:
         I_S: A; its interval is symmetric on the logarithm.
@@ -33,8 +42,9 @@ class Transfer:
         swing: V per decade, m V_T ln 10.
         leakage: constant current beside the line, A, either sign; None: none fitted.
         V_T: thermal voltage used, V.
-        points: number of points in the fit.
-        range: (lowest, highest) V_GS in the fit, V.
+        points: number of points in the range.
+        range: (lowest, highest) V_GS of the points that tell the line, V: where it is
+            five times what leaks and what the ammeter scatters by.
         scatter: standard deviation of ln I_DS about the line.
     """
 
@@ -61,15 +71,14 @@ def fit_transfer(
     V_T: float = 0.025,
     between: tuple[float, float] | None = None,
 ) -> Transfer:
-    """Fit I_DS = I_S exp(V_GS/(m V_T)) + leakage, on its logarithm, below threshold.
+    """Fit I_DS = I_S exp(V_GS/(m V_T)) + leakage below threshold.
 
     Args:
         V_GS: gate-source voltage, V.
-        I_DS: drain current, A; points at or below 0 A are left out.
+        I_DS: drain current, A.
         V_T: thermal voltage, V.
         between: V_GS to fit, V, its ends in either order, and by a line without
-            leakage; by default up to 2.75 V and from five times the smallest current
-            up.
+            leakage through ln I_DS, where that is over 0 A; by default up to 2.75 V.
 
     Raises:
         ParameterError: unequal shapes or values that are not finite.
@@ -98,9 +107,16 @@ def fit_transfer(
     if x.size < FEWEST:
         raise NotIdentifiableError(_too_few(int(x.size), volts, between))
     line = Line.through(x, y) if np.ptp(x) > 0 else None
-    leakage: float | None = None
+    beside: _Beside | None = None
     if line is not None and line.slope.value > 0 and between is None:
-        line, leakage = _beside_leakage(x, y, line)
+        below = volts <= SUBTHRESHOLD_END
+        x = volts[below]
+        beside = _beside_leakage(x, amperes[below], line)
+        line = beside.line
+        over = ABOVE_FLOOR * max(abs(beside.leakage), beside.noise)
+        x = x[line.offset.value + line.slope.value * x >= math.log(over or math.ulp(0))]
+        if x.size < FEWEST:
+            raise NotIdentifiableError(_too_few(int(x.size), volts, between))
     if line is None or line.slope.value <= 0:
         raise NotIdentifiableError(
             f"I_DS does not rise with V_GS in the {x.size} points fitted: check which "
@@ -114,7 +130,7 @@ def fit_transfer(
         ),
         m=_reciprocal(steep, 1 / V_T),
         swing=_reciprocal(steep, math.log(10)),
-        leakage=leakage,
+        leakage=None if beside is None else beside.leakage,
         V_T=V_T,
         points=int(x.size),
         range=(float(x.min()), float(x.max())),
@@ -122,34 +138,91 @@ def fit_transfer(
     )
 
 
-def _beside_leakage(x: FloatArray, y: FloatArray, line: Line) -> tuple[Line, float]:
-    """The line of which, and of a constant current, A, y = ln I_DS consists."""
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """A line and a constant current, of which a curve consists.
+
+    Attributes:
+        line: ln I_DS of the line alone; its scatter is what grows with the current.
+        leakage: the constant current, A, either sign.
+        noise: standard deviation of what scatters alike at all currents, A.
+    """
+
+    line: Line
+    leakage: float
+    noise: float
+
+
+def _beside_leakage(x: FloatArray, amperes: FloatArray, line: Line) -> _Beside:
+    """The line, and the constant current, of which the current at x (V) consists.
+
+    A part of the current scatters, and so does the ammeter, whatever the current: what
+    each point tells is weighed by both, which its own points tell. So points are taken
+    whatever their sign: to leave out those that noise took below 0 A is to take too
+    much current for the others.
+    """
     from scipy.optimize import least_squares
 
-    middle, unit = float(x.mean()), math.exp(float(y.min()))
+    middle = float(x.mean())
     apart = x - middle
 
-    def left(p: FloatArray) -> FloatArray:
-        alone = np.exp(p[0] + p[1] * apart)
-        return np.asarray(np.log(np.maximum(alone + p[2] * unit, 1e-3 * alone)) - y)
+    def of(p: FloatArray) -> FloatArray:
+        return np.asarray(np.exp(np.minimum(p[0] + p[1] * apart, LARGEST)))
 
-    level = line.offset.value + line.slope.value * middle
-    begin = np.array([level, line.slope.value, 0.0])
-    found = least_squares(left, begin, x_scale="jac", method="lm")
-    freedom = x.size - begin.size
-    scatter = math.sqrt(2 * found.cost / freedom)
-    if scatter < LEAST:
-        return line, 0.0
+    p = np.array([line.offset.value + line.slope.value * middle, line.slope.value])
+    lowest = np.argsort(x)[: max(FEWEST // 2, x.size // 4)]
+    over = (amperes - of(p))[lowest]
+    leakage = float(np.median(over))
+    scatter, noise = max(line.scatter, LEAST), float(np.abs(over).max())
+    if not noise > LEAST * float(np.abs(amperes).max()) and line.scatter < LEAST:
+        return _Beside(line, 0.0, 0.0)
+
+    def left(p: FloatArray, unit: float, spread: FloatArray) -> FloatArray:
+        return np.asarray((of(p) + p[2] * unit - amperes) / spread)
+
+    p = np.append(p, 0.0)
+    for _ in range(ROUNDS):
+        unit = noise or float(np.abs(amperes).min())
+        spread = np.hypot(scatter * (of(p) + abs(leakage)), noise)
+        p[2] = leakage / unit
+        found = least_squares(left, p, x_scale="jac", method="lm", args=(unit, spread))
+        moved = np.abs(found.x - p)
+        p = np.asarray(found.x, dtype=np.float64)
+        leakage = float(p[2]) * unit
+        alone = of(p)
+        before = scatter, noise
+        scatter, noise = _scatters(alone + leakage - amperes, alone + abs(leakage))
+        if np.allclose((scatter, noise), before, rtol=1e-4) and moved.max() < 1e-6:
+            break
+    freedom = x.size - p.size - (1 if noise else 0)
     slopes = np.asarray(found.jac, dtype=np.float64)
-    covariance = np.linalg.pinv(slopes.T @ slopes) * scatter**2
+    size = x.size / freedom  # what the fit took of the scatter
+    covariance = np.linalg.pinv(slopes.T @ slopes) * size
     at_zero = np.array([1.0, -middle, 0.0])
-    level, slope, part = map(float, found.x)
     errors = np.sqrt([covariance[1, 1], at_zero @ covariance @ at_zero])
     steep, offset = (
-        Estimate.of(value, float(error), freedom)
-        for value, error in zip((slope, level - slope * middle), errors, strict=True)
+        Estimate.of(float(value), float(error), freedom)
+        for value, error in zip((p[1], p[0] - p[1] * middle), errors, strict=True)
     )
-    return Line(steep, offset, scatter), part * unit
+    root = math.sqrt(size)
+    return _Beside(Line(steep, offset, scatter * root), leakage, noise * root)
+
+
+def _scatters(left: FloatArray, current: FloatArray) -> tuple[float, float]:
+    """Which part of `current` scatters, and how many amperes: the likeliest pair.
+
+    No amperes where they make what is left, A, little likelier than none.
+    """
+    apart = np.geomspace(0.1 * current.min(), 10 * current.max(), PAIRS)
+    apart = np.append(0.0, apart)  # amperes over part
+    shape = current**2 + apart[:, np.newaxis] ** 2
+    part = np.maximum(np.mean(left**2 / shape, axis=1), LEAST**2)
+    unlikely = left.size * np.log(part) + np.log(shape).sum(axis=1)
+    best = int(unlikely.argmin())
+    if unlikely[0] - unlikely[best] < SURE:
+        best = 0
+    found = math.sqrt(part[best])
+    return found, found * float(apart[best])
 
 
 def _too_few(
