@@ -124,14 +124,19 @@ def identified(truth: Truth, wobble: float | None) -> Fit:
     return fit
 
 
-def transfer(leakage: float) -> Fit:
-    """Fit Table 1's transfer curve with 5 % noise, beside a leakage, A."""
+def transfer(leakage: float, ammeter: float = 0.0) -> Fit:
+    """Fit Table 1's transfer curve with 5 % noise, beside a leakage, A.
+
+    `ammeter` scatters by so much, A, whatever the current.
+    """
 
     def fit(seed: int) -> dict[str, Estimate]:
         volts, circuit = np.linspace(0, 2.75, 56), Circuit()
         line = circuit.I_S * np.exp(volts / (circuit.m * circuit.V_T)) + leakage
-        noise = np.random.default_rng(seed).normal(0, 0.05, volts.size)
-        found = fit_transfer(volts, line * np.exp(noise))
+        rng = np.random.default_rng(seed)
+        noise = rng.normal(0, 0.05, volts.size)
+        beside = rng.normal(0, ammeter, volts.size)
+        found = fit_transfer(volts, line * np.exp(noise) + beside)
         return {"I_S": found.I_S, "m": found.m}
 
     return fit
@@ -191,9 +196,13 @@ def cases() -> list[tuple[str, Truth, Fit]]:
     found.append(
         ("circuit, V_C1 and spikes, V_fire ±20 mV", three, identified(three, 0.02))
     )
-    for leakage, beside in ((0.0, ""), (1e-11, ", 10 pA leak")):
+    for leakage, ammeter, beside in (
+        (0.0, 0.0, ""),
+        (1e-11, 0.0, ", 10 pA leak"),
+        (-1e-11, 1e-11, ", an ammeter 10 pA off with 10 pA of noise"),
+    ):
         truth = {"I_S": 1.216e-12, "m": 5.646}
-        found.append((f"transfer curve{beside}", truth, transfer(leakage)))
+        found.append((f"transfer curve{beside}", truth, transfer(leakage, ammeter)))
     found.append(("I_DS decay", {"tau": 8.69}, decay))
     return found
 
