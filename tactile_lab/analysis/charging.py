@@ -21,7 +21,10 @@ Drive = Callable[[FloatArray], FloatArray]
 REACH = 1.2
 """The drive is known from so much below V_GS to as much above it, V."""
 GRID = 1201
-"""Points at which T1's current is computed; straight between them."""
+"""Points at which node A is solved: it is straight in I_DS, but for exp(-V_C1/V_T)."""
+FINER = 16
+"""And so many times more at which T1's current is computed, straight between them:
+without R3 it grows by an eighth from one of the others to the next."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
@@ -34,9 +37,12 @@ class Charging:
 
     def __init__(self, circuit: Circuit) -> None:
         self.circuit = circuit
-        self._drive = circuit.V_GS + np.linspace(-REACH, REACH, GRID)
-        V_C1 = [rest_V_C1(circuit, float(u - circuit.V_GS)) for u in self._drive]
-        self._current = I_C(circuit, np.array(V_C1)) + circuit.I_bias
+        solved = np.linspace(-REACH, REACH, GRID)
+        V_P = np.linspace(-REACH, REACH, FINER * (GRID - 1) + 1)
+        I_DS, known = (np.exp(v / (circuit.m * circuit.V_T)) for v in (V_P, solved))
+        V_C1 = np.interp(I_DS, known, [rest_V_C1(circuit, float(v)) for v in solved])
+        self._drive = circuit.V_GS + V_P
+        self._current = I_C(circuit, V_C1) + circuit.I_bias
 
     def current(self, drive: FloatArray) -> FloatArray:
         """Into C2 at that drive, V, A."""

@@ -52,6 +52,16 @@ def test_a_scatter_that_is_small_by_luck_tells_no_tau():
         fit_circuit_adaptation(Circuit(), spikes + np.cumsum(wobble), (0.1, 0.6))
 
 
+@pytest.mark.parametrize("level", [0.02, 0.03, 0.04])
+def test_a_circuit_without_R3_obeys_its_own_law(level):
+    """Its current was straight between points an eighth apart: tau was 8.51 s."""
+    direct = Circuit(t1="direct", I_T1s=1.3e-20)
+    law = fit_circuit_adaptation(direct, held(direct, level, 2.0), (0.3, 2.25))
+    assert law.tau.value == pytest.approx(direct.tau, abs=0.02)
+    assert law.V_GS.value == pytest.approx(direct.V_GS, abs=1e-4)
+    assert law.scatter < 2e-4
+
+
 @pytest.mark.parametrize("begin", [0.264, 0.2983, 0.3284])
 def test_a_law_without_another_spike_is_silent_from_the_measured_last_one(begin):
     """Not from a rounding later, which was told as a law that would fire on."""
