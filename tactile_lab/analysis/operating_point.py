@@ -55,10 +55,12 @@ def V_GS_of_onset(
 
 def _edge(circuit: Circuit, force: Waveform) -> float:
     """The V_GS above which it fires under a force."""
+    # whether it fires is asked, not how often: without R3 that is without bound
+    once = replace(circuit, t_eps=force.end - force.start)
 
     def fires(V_GS: float) -> bool:
         found = simulate(
-            replace(circuit, V_GS=V_GS), force, keep=("spikes",), tolerance=1e-6
+            replace(once, V_GS=V_GS), force, keep=("spikes",), tolerance=1e-6
         ).spike_times
         return found is not None and found.size > 0
 

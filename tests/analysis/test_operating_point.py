@@ -31,6 +31,15 @@ def test_the_critical_force_gives_v_gs_back_to_a_millivolt(V_GS):
     assert high - low < 1e-3
 
 
+def test_a_circuit_without_R3_gives_v_gs_back():
+    """0.15 V above its V_GS it would fire 1e7 times, which was refused."""
+    direct = Circuit(t1="direct", I_T1s=1.3e-20)
+    silent, fires = bracket(direct, low=0.002, high=0.02)
+    low, high = V_GS_of_onset(direct, push(silent), push(fires))
+    assert low < direct.V_GS < high
+    assert high - low < 1e-3
+
+
 def test_the_force_s_error_widens_it_by_0_65_mn_a_millivolt():
     silent, fires = bracket(Circuit())
     low, high = V_GS_of_onset(Circuit(), push(silent), push(fires))
