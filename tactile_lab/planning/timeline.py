@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.acquisition.program import SETTLED
 from tactile_lab.arrays import FloatArray
 from tactile_lab.current_list import CurrentList
 from tactile_lab.drive import Drive
@@ -27,6 +28,10 @@ MOST_TRIALS = 10_000
 MOST_BENDS = 200_000
 """Points of the force that stairs may have, 6 minutes of a sine or an hour of a slow
 ramp; each takes the plan up to 2.3 kB. Trials after that have the current as asked."""
+
+RAMPED = 1.5
+"""Time that a source meter takes for a ramp over what its slew limit allows: each step
+waits for the answer to the one before (measured, 57600 baud)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +165,7 @@ class _Driver:
         self._loaded: CurrentList | None = None
 
     def take(self, trial: Trial) -> Outcome:
+        trial = self._held(trial)
         length, force, current = trial.length, trial.force, trial.current
         magnet, drive = self.scene.bench.magnet, None
         if self.through_coil:
@@ -174,7 +180,6 @@ class _Driver:
             force = cut(magnet.force_for(current, beyond="hold"), length)
         else:
             force = cut(force, length)
-        self._voltages = {**self._voltages, **trial.voltages}
         step = Step(trial, self._time, force, current, drive, self._voltages)
         self.steps.append(step)
         self._time += length
@@ -182,6 +187,27 @@ class _Driver:
         outcome = ModelOutcome(self.model, len(self.steps) - 1)
         self._outcomes.append(outcome)
         return outcome
+
+    def _held(self, trial: Trial) -> Trial:
+        """The trial with its voltages: a pause lasts until the circuit has settled.
+
+        Before any other trial that is time at rest. A run begins with its first ones.
+        """
+        sources, before = self.scene.bench.voltage_sources, self._voltages
+        self._voltages = {**before, **trial.voltages}
+        stood = {**self.scene.sourced, **before}
+        takes = [
+            RAMPED * abs(volts - stood[name]) / sources[name].limits.slew
+            for name, volts in trial.voltages.items()
+            if volts != stood.get(name, volts) and name in sources
+        ]
+        if not takes or not self.steps:
+            return trial
+        settled = max(takes) + SETTLED * self.scene.circuit.tau_L
+        if trial.pause:
+            return replace(trial, duration=max(trial.length, settled))
+        self._rests += settled
+        return trial
 
     def _by_set_points(self, drive: Drive) -> tuple[Waveform, tuple[float, float]]:
         """The force of stairs, N, and what the lags leave of it."""

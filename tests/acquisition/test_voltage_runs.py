@@ -5,6 +5,7 @@ import json
 import re
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from benches import WITH_A_SOURCE_METER
 
@@ -295,3 +296,30 @@ def test_readings_are_exported(scene, execute, tmp_path):
         measured = [float(row["measured_V"]) for row in rows]
         assert measured == pytest.approx(list(run.voltages["measured"]))
         assert {row["name"] for row in rows} == {"V_GS"}
+
+
+def test_a_pause_lasts_as_planned_where_the_voltage_takes_longer(execute, tmp_path):
+    """Three of 0.7 s were planned; with a source at 20 mV/s they took 11.3 s."""
+    file = tmp_path / "bench.toml"
+    file.write_text(WITH_A_SOURCE_METER)
+    trimmed = load(
+        "threshold_trim",
+        (
+            *("protocol.wanted=130 mN", "protocol.low=1.38 V", "protocol.high=1.45 V"),
+            *("protocol.resolution=20 mV", "protocol.margin=0 N"),
+            *("protocol.residual=20 mV", "sensor.tau=0.3 s"),
+            *("protocol.ramp=0.05 s", "protocol.hold=0.5 s"),
+            'record.signals=["V_K", "spikes"]',
+            "bench.voltage_source.V_GS.limits.slew=20 mV/s",
+            "bench.voltage_source.V_GS.limits.lowest=1.3 V",
+        ),
+        file,
+    )
+    planned = plan(trimmed).estimate
+    done = execute(trimmed)
+    with Run.load(done.folder) as run:
+        pauses = run.records("pauses")
+        paused = np.sum(pauses["end"] - pauses["start"])
+    expected = planned.duration - planned.streamed
+    assert paused == pytest.approx(expected, abs=0.2 * len(pauses))
+    assert expected > 5.0
