@@ -262,7 +262,7 @@ def _gate(
     try:
         low, high = V_GS_of_onset(run.circuit, silent, fires, force_error, displaced)
     except NotIdentifiableError as reason:
-        return Conclusion((f"No V_GS explains the critical force: {reason}.",))
+        return Conclusion((f"No V_GS is told of the critical force: {reason}.",))
     said = (
         f"By the model, a V_GS of {show((low + high) / 2, 'V', 5)} "
         f"({show(low, 'V', 5)} to {show(high, 'V', 5)}, 95 %, the circuit's other "

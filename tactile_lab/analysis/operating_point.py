@@ -39,22 +39,25 @@ def V_GS_of_onset(
             95 % band; widens it likewise.
 
     Raises:
-        NotIdentifiableError: none within 0.15 V of the believed V_GS agrees.
+        NotIdentifiableError: none within 0.15 V of the believed V_GS agrees, or all do
+            with one of the trials.
     """
-    low, high = _edge(circuit, fires), _edge(circuit, silent)
+    weakest = "the weakest force that fired"
+    low = _edge(circuit, fires, weakest)
+    high = _edge(circuit, silent, "the strongest silent one")
     if low > high:
         raise NotIdentifiableError(
-            f"the weakest force that fired asks for a V_GS above {show(low, 'V', 6)}, "
+            f"{weakest} asks for a V_GS above {show(low, 'V', 6)}, "
             f"the strongest silent one for less than {show(high, 'V', 6)}"
         )
-    moved = [_edge(other, fires) - low for other in displaced]
+    moved = [_edge(other, fires, weakest) - low for other in displaced]
     half = (high - low) / 2
     wider = math.hypot(half, circuit.k_F * force_error, *moved) - half
     return low - wider, high + wider
 
 
-def _edge(circuit: Circuit, force: Waveform) -> float:
-    """The V_GS above which it fires under a force."""
+def _edge(circuit: Circuit, force: Waveform, which: str) -> float:
+    """The V_GS above which it fires under a force, of that name."""
     # whether it fires is asked, not how often: without R3 that is without bound
     once = replace(circuit, t_eps=force.end - force.start)
 
@@ -65,9 +68,11 @@ def _edge(circuit: Circuit, force: Waveform) -> float:
         return found is not None and found.size > 0
 
     low, high = circuit.V_GS - REACH, circuit.V_GS + REACH
-    if fires(low) or not fires(high):
+    always = fires(low)
+    if always or not fires(high):
         raise NotIdentifiableError(
-            f"no V_GS from {show(low, 'V')} to {show(high, 'V')} explains it"
+            f"under {which} it {'fires' if always else 'is silent'} by the model with "
+            f"each V_GS from {show(low, 'V')} to {show(high, 'V')}"
         )
     for _ in range(math.ceil(math.log2((high - low) / CLOSE))):
         tried = (low + high) / 2

@@ -73,5 +73,13 @@ def test_trials_that_contradict_each_other_are_refused():
 
 def test_a_threshold_far_away_is_refused():
     far = replace(Circuit(), V_th=3.9)
-    with pytest.raises(NotIdentifiableError, match="no V_GS from"):
+    said = "weakest force that fired it is silent by the model with each V_GS from"
+    with pytest.raises(NotIdentifiableError, match=said):
         V_GS_of_onset(far, push(0.001), push(0.002))
+
+
+def test_a_silent_pull_tells_no_v_gs_and_contradicts_none():
+    """It was said that no V_GS explains it: with the believed one the model agrees."""
+    said = "strongest silent one it is silent by the model with each V_GS from"
+    with pytest.raises(NotIdentifiableError, match=said):
+        V_GS_of_onset(Circuit(), push(-0.08), push(0.1))
