@@ -70,7 +70,7 @@ def _held(change: FloatArray, value: FloatArray) -> Callable[[FloatArray], Float
 
 
 def drain_current_of(run: StoredRun) -> DrainCurrent:
-    """I_DS by Eq. (16) from the stored V_C1; NaN where samples are missing.
+    """I_DS by Eq. (16) from the stored V_C1; NaN where that is missing or a limit.
 
     Raises:
         RunFolderError: V_C1 was not stored, or there are too few samples of it.
@@ -89,9 +89,9 @@ def drain_current_of(run: StoredRun) -> DrainCurrent:
     for part in parts[1:]:
         times += [part.time[:1] - step / 2, part.time]
         currents += [np.array([np.nan]), part.current]
-    return DrainCurrent(
-        np.concatenate(times),
-        np.concatenate(currents),
-        min(part.bandwidth for part in parts),
-        max(part.averaged for part in parts),
-    )
+    averaged = max(part.averaged for part in parts)
+    found, current = np.concatenate(times), np.concatenate(currents)
+    for start, end in run.overrange("V_C1"):
+        within = (found > start - averaged / 2) & (found < end + averaged / 2)
+        current[within] = np.nan
+    return DrainCurrent(found, current, min(part.bandwidth for part in parts), averaged)

@@ -121,6 +121,27 @@ def test_a_spike_that_is_over_after_its_trial_counts_in_it(run_scene):
     assert [outcome.spike_times.size for outcome in told] == inside
 
 
+def test_no_drain_current_is_derived_from_a_limit(run_scene, short):
+    """V_C1 rested at 3.9 V, its channel's end: 76 nA of I_DS were told, 24 flowed."""
+    ran = run_scene(
+        *short,
+        'record.signals=["V_C1"]',
+        'bench.scope.channels=[{signal="V_C1", input="A", range="2 V", '
+        'offset="-1.9 V"}, {signal="coil_current", input="D", range="200 mV", '
+        'shunt="0.1 Ohm"}]',
+    )
+    with ran.stored() as run:
+        found, cut_off = run.I_DS, run.overrange("V_C1")
+        limit = np.zeros(found.time.size, bool)
+        for start, end in cut_off:
+            limit |= (found.time > start) & (found.time < end)
+        assert np.all(np.isnan(found.current[limit])) and limit.sum() > 100
+        clear = np.ones(found.time.size, bool)
+        for start, end in cut_off:
+            clear &= (found.time < start - 0.1) | (found.time > end + 0.1)
+        assert np.all(found.current[clear] > 40e-9) and clear.sum() > 100
+
+
 def test_too_slow_sampling_loses_spikes(run_scene, short):
     fast = run_scene(*short)
     slow = run_scene(*short, "record.sample_rate=0.2 MS/s")
