@@ -14,6 +14,7 @@ from tactile_lab.analysis.control_chart import mean_and_error
 from tactile_lab.analysis.estimate import student_95
 from tactile_lab.conclusion import Table
 from tactile_lab.errors import ParameterError
+from tactile_lab.measurement import DAGGER
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import count, show, show_within
 from tactile_lab.report.canvas import draw, save
@@ -43,11 +44,19 @@ class OneOfSeveral:
         entry: what it says of itself.
         rates: force of each trial, N, and its highest rate, Hz; NaN below two spikes.
         numbers: that were concluded or measured, by key.
+        uncounted: whether spikes of a trial were seen, and are no count.
     """
 
     entry: RunSummary
     rates: tuple[tuple[float, float], ...]
     numbers: dict[str, list[Fact]]
+    uncounted: bool = False
+
+    @property
+    def spikes(self) -> str:
+        """How many were found; empty where they were not looked for."""
+        found = self.entry.spikes
+        return "" if found is None else f"{found}{DAGGER if self.uncounted else ''}"
 
     @property
     def specimen(self) -> str:
@@ -126,7 +135,10 @@ class SeveralRuns:
             said.append(f"{simulated} of them are simulated and count as the others.")
         ended = [r.entry.name for r in self.runs if r.entry.status != "complete"]
         if ended:
-            said.append(f"Not complete: {', '.join(ended)}.")
+            said.append(
+                f"Not complete: {', '.join(ended)}. No mean is of a trial that was cut "
+                "short."
+            )
         return said
 
     @property
@@ -136,14 +148,17 @@ class SeveralRuns:
         rows = []
         for run in self.runs:
             told = (_shown(run.mean(key), unit) for key, unit in keys.items())
-            spikes = "" if run.entry.spikes is None else str(run.entry.spikes)
-            rows.append((run.entry.name, run.entry.sensor, spikes, *told))
+            rows.append((run.entry.name, run.entry.sensor, run.spikes, *told))
+        note = (
+            "Of a number that a run has several times, such as at each force, the mean."
+        )
+        if any(run.uncounted for run in self.runs):
+            note += f" {DAGGER}: seen, no count of the spikes there were."
         return Table(
             title="Runs",
             headings=("Run", "Sensor", "Spikes", *keys),
             rows=tuple(rows),
-            note="Of a number that a run has several times, such as at each force, "
-            "the mean.",
+            note=note,
         )
 
     @property
@@ -275,7 +290,8 @@ def _read(folder: Path, progress: Progress) -> OneOfSeveral:
         if trial["level_N"] is not None
         for rate in (trial["peak_rate_Hz"],)
     )
-    return OneOfSeveral(summary(folder), rates, grouped(of_results(told)))
+    uncounted = any(trial["uncounted"] for trial in told["trials"])
+    return OneOfSeveral(summary(folder), rates, grouped(of_results(told)), uncounted)
 
 
 def _against_force(

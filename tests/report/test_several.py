@@ -48,3 +48,11 @@ def test_what_is_mixed_or_missing_is_said() -> None:
     said = " ".join(RUNS.sentences)
     assert "4 runs of 3 specimens" in said and "1 of them note no sensor" in said
     assert "1 of them are simulated" in said and "Not complete: d" in said
+
+
+def test_spikes_that_are_no_count_are_marked() -> None:
+    """17 of 60 stood there like a count, of V_K at 100 kS/s."""
+    entry = RunSummary(folder=Path("a"), name="a", spikes=17)
+    table = SeveralRuns((OneOfSeveral(entry, (), {}, uncounted=True), RUNS.runs[1]))
+    assert table.table.rows[0][2] == "17†" and "no count" in table.table.note
+    assert "no count" not in RUNS.table.note
