@@ -153,10 +153,17 @@ def _spike_sampling(scene: Scene, needed: Needs) -> Iterator[str]:
     rate, width = scene.record.sample_rate, spike_width(scene)
     interval = 1 / rate
     if width == 0:
+        (wired,) = (c for c in needed.channels if c.signal == "V_K")
+        height, code = _height(scene), resolution(scene, wired)
+        advice = "Lower it."
+        if height < code:
+            advice = (
+                f"One code of scope input {wired.input} is {show(code, 'V', 3)}: "
+                "choose a smaller range for it, and a threshold that spikes reach."
+            )
         yield (
-            f"no spike is high enough: V_K rises to {show(_height(scene), 'V', 3)} "
-            "behind its follower, the threshold is "
-            f"{show(threshold_of(scene), 'V')}. Lower it."
+            f"no spike is high enough: V_K rises to {show(height, 'V', 3)} behind its "
+            f"follower, the threshold is {show(threshold_of(scene), 'V')}. {advice}"
         )
     elif misses_spikes(scene, needed):
         yield (

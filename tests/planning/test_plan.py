@@ -142,7 +142,17 @@ def test_hum_above_the_threshold_is_warned_of():
 
 
 def test_spikes_that_never_reach_the_threshold_are_warned_of():
-    assert "no spike is high enough" in warned("detect.threshold=4 V")
+    told = warned("detect.threshold=4 V")
+    assert "no spike is high enough" in told and told.endswith("is 4 V. Lower it.")
+
+
+def test_spikes_within_one_code_are_not_found_by_a_lower_threshold():
+    """Behind its follower a spike had 16 mV, a code 39 mV: "Lower it" was told."""
+    told = warned("sensor.C2=0.05 pF")
+    assert "rises to 15.9 mV" in told and "One code of scope input C is 39.4" in told
+    assert "Lower" not in told
+    told = warned("sensor.C2=0.15 pF")
+    assert "rises to 45 mV" in told and told.endswith("Lower it.")
 
 
 def test_the_printed_a2_is_told_and_a_real_core_is_not():
