@@ -139,7 +139,8 @@ def print_list(
         kind = {True: "sim", False: "real", None: "?"}[entry.simulated]
         length = "" if entry.duration is None else f"{entry.duration:.1f} s"
         spikes = "" if entry.spikes is None else count(entry.spikes, "spike")
-        told = entry.trouble or entry.loss
+        empty = "" if entry.recorded else "none recorded"
+        told = entry.trouble or entry.loss or empty
         if key is not None:
             told = shown(facts[i].get(key, ()))
         elif not entry.trouble:

@@ -39,13 +39,20 @@ def describe(path: Path) -> dict[str, Any]:
         RunFolderError: not a run folder, or its data cannot be read.
     """
     from tactile_lab.errors import RunFolderError
-    from tactile_lab.store.folder import DATA, has_lost_data, read_info, told_status
+    from tactile_lab.store.folder import (
+        DATA,
+        PLANNED,
+        has_lost_data,
+        read_info,
+        told_status,
+    )
     from tactile_lab.store.remarks import read_remarks
     from tactile_lab.store.run import Run
     from tactile_lab.store.stored_run import ended
     from tactile_lab.store.uncounted import uncounted
 
     info = read_info(path)
+    planned = info.get(PLANNED) or {}
     status = told_status(path, info["status"])
     summary: dict[str, Any] = {
         "run": str(path),
@@ -60,10 +67,12 @@ def describe(path: Path) -> dict[str, Any]:
         "remarks": asdict(read_remarks(path)),
         "temperature_K": (info.get("temperature") or {}).get("K"),
         "detection": info.get("detection"),
-        "instruments": {
+        "instruments": dict.fromkeys(planned)
+        | {
             name: found.get("identity")
             for name, found in (info.get("instruments") or {}).items()
         },
+        "instruments_planned": planned,
         "instruments_changed": info.get("instruments_changed") or [],
         "inputs": info.get("files") or {},
         "loss": info.get("loss"),
@@ -134,7 +143,10 @@ def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
         yield "note", f"{at}{note['text']}"
     if summary["temperature_K"] is not None:
         yield "temperature", f"{summary['temperature_K'] - ZERO_CELSIUS:.4g} °C"
-    yield from summary["instruments"].items()
+    planned = summary["instruments_planned"]
+    for name, identity in summary["instruments"].items():
+        unheard = f"{planned[name]}: not heard from" if name in planned else None
+        yield name, identity or unheard
     yield from (("changed", line) for line in summary["instruments_changed"])
     if found := summary["detection"]:
         why = ", from the noise" if found["from"] == "noise" else ""
@@ -142,6 +154,8 @@ def rows(summary: dict[str, Any]) -> Iterator[tuple[str, object]]:
         yield "detection", f"{found['signal']}, {found['kind']} at {threshold}{why}"
     if summary["duration_s"] is not None:
         yield "duration", show(summary["duration_s"], "s")
+    elif summary["status"] != "data gone":
+        yield "samples", "none recorded"
     for name, signal in summary["signals"].items():
         rate = show(signal["sample_rate_Hz"], "S/s")
         step = show(signal["resolution"], signal["unit"], 3)

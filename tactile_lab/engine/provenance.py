@@ -15,12 +15,14 @@ from typing import Any
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Bench
 from tactile_lab.errors import RecordingError
+from tactile_lab.planning.needs import Needs
 from tactile_lab.planning.plan import Plan
 from tactile_lab.plugins import ships
+from tactile_lab.scene.bench_file import PortSpec, ScopeSpec
 from tactile_lab.scene.scene import Scene
 from tactile_lab.scene.tables import ZERO_CELSIUS
 from tactile_lab.scope import Stream
-from tactile_lab.store.folder import INPUTS, SCENE, RunFolder
+from tactile_lab.store.folder import INPUTS, PLANNED, SCENE, RunFolder
 from tactile_lab.store.layout import Layout
 from tactile_lab.table import dumped
 from tactile_lab.trust import code_named, remember
@@ -45,11 +47,31 @@ def origin(plan: Plan, bench: Bench, notes: Mapping[str, str]) -> dict[str, Any]
         "seed": scene.simulated.seed if bench.simulated else None,
         "sample_rate_Hz": scene.record.sample_rate,
         "planned_s": plan.estimate.duration,
+        PLANNED: instruments(scene, plan.needs),
         "warnings": list(plan.warnings),
         "assumptions": list(plan.assumptions),
         "notes": dict(notes),
         "environment": environment(),
     }
+
+
+def instruments(scene: Scene, needed: Needs) -> dict[str, str]:
+    """What a run is to open, by the names under which `run.json` has what it opened."""
+    bench = scene.bench
+    wanted: dict[str, PortSpec | ScopeSpec | None] = {
+        "coil": bench.coil if needed.coil else None,
+        "scope": bench.scope if needed.channels else None,
+        "field meter": bench.field_meter if needed.field_meter else None,
+        "thermometer": bench.thermometer if needed.thermometer else None,
+    }
+    sources = {f"source of {n}": bench.voltage_sources[n] for n in needed.voltages}
+    found = {}
+    for name, spec in {**wanted, **sources}.items():
+        if spec is not None:
+            kind = Path(spec.dialect or spec.driver).name  # may be somebody's own file
+            at = f" at {spec.port}" if isinstance(spec, PortSpec) else ""
+            found[name] = f"{kind}{at}"
+    return found
 
 
 def layout(

@@ -30,6 +30,9 @@ CHANGED = "changed_before_recovery"
 ZERO = "time_zero"
 """Key of `run.json`: when the run's time was 0; runs of older versions lack it."""
 
+PLANNED = "instruments_planned"
+"""Key of `run.json`: what the run is to open; runs of older versions lack it."""
+
 DATA, LOG, SCENE, REPORT = "data.h5", "log.jsonl", "scene.toml", "report.html"
 
 INPUTS = "inputs"

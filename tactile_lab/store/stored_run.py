@@ -76,9 +76,10 @@ class StoredRun:
         if not file.exists():
             status = info["status"]
             how = "was cut short" if status == "running" else f"ended ({status})"
+            shown = "says why" if info.get("reason") else "tells what it was to use"
             raise RunFolderError(
                 f"{path} has no {DATA}: the run {how} before the first "
-                "sample was stored. `tactile-lab show` says why; "
+                f"sample was stored. `tactile-lab show` {shown}; "
                 f"`{again}` repeats it."
             )
         try:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tactile_lab.store.folder import DATA
+
 if TYPE_CHECKING:
     from tactile_lab.store.run import Run
 
@@ -52,6 +54,11 @@ class RunSummary:
     spikes: int | None = None
     loss: str = ""
     trouble: str = ""
+
+    @property
+    def recorded(self) -> bool:
+        """Whether its samples are there, or were."""
+        return self.status == "data gone" or (self.folder / DATA).exists()
 
     def load(self) -> Run:
         """The run itself, opened for reading.

@@ -137,6 +137,7 @@ def test_a_serial_one_is_read_kept_and_exported(serial, tmp_path):
     assert info["temperature"]["from"] == "thermometer"
     assert info["temperature"]["K"] == pytest.approx(believed, abs=0.03)
     assert info["instruments"]["thermometer"]["identity"].startswith("LSCI,MODEL335")
+    assert info["instruments_planned"].keys() == info["instruments"].keys()
     assert info["instruments_changed"] == []  # it is no setting that moved
     found = dict(plan(made).uses)
     assert found["thermometer"] == "lakeshore-335 reads the sensor's temperature"

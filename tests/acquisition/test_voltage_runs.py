@@ -97,6 +97,7 @@ def test_V_GS_is_set_held_logged_and_left_at_rest(scene, execute):
         assert "output off" in run.info["voltages_left"]["V_GS"]
         settings = run.info["instruments"]["source of V_GS"]
         assert settings["compliance_A"] == "0.0001"
+        assert run.info["instruments_planned"].keys() == run.info["instruments"].keys()
         assert run.info["instruments_changed"] == []
         assert len(run.to_pandas("voltages")) == len(rows)
     read = [one for one in seen if isinstance(one, VoltageRead)]

@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from tactile_lab.engine.execution import Execution
+from tactile_lab.scene.load import load
 from tactile_lab.store.folder import RunFolder, is_live
 from tactile_lab.trust import INFO
 
@@ -59,6 +61,31 @@ def test_a_run_killed_before_its_first_sample_did_not_end(tactile_lab, tmp_path)
     answer = tactile_lab("report", killed.path)
     assert answer.code == 2
     assert "was cut short before the first sample" in answer.err
+
+
+def test_a_run_killed_before_its_first_sample_tells_what_it_was_to_use(
+    tactile_lab, tmp_path
+):
+    """No instrument was named, and none that nothing was recorded."""
+    field = 'record.signals=["V_C1", "field"]'
+    killed = Execution(load("demo", (field,)), tmp_path).folder
+    killed._log.close()
+    listed = tactile_lab("runs", tmp_path).out.splitlines()[1]
+    assert listed.endswith("none recorded")
+    shown = tactile_lab("show", killed.path).out
+    for line in (
+        "coil         kepco-bop at sim://coil: not heard from",
+        "scope        ps3000a: not heard from",
+        "field meter  lakeshore-425 at sim://field_meter: not heard from",
+        "samples      none recorded",
+    ):
+        assert line in shown.splitlines(), shown
+    told = tactile_lab("show", killed.path, "--json").json
+    names = {"coil", "scope", "field meter"}
+    assert told["instruments"] == dict.fromkeys(names)
+    assert told["instruments_planned"].keys() == names
+    report = tactile_lab("report", killed.path)
+    assert "`tactile-lab show` tells what it was to use" in report.err
 
 
 def test_a_folder_of_runs_is_refused_with_their_names(tactile_lab, tmp_path):
