@@ -32,6 +32,7 @@ from tactile_lab.plot import (
     z_scale,
 )
 from tactile_lab.report import palette
+from tactile_lab.report.near import from_near
 from tactile_lab.report.palette import INK, MEASURED, PAPER, QUIET, RULE, SIMULATED
 from tactile_lab.whole_file import replacing, write_text
 
@@ -52,6 +53,7 @@ STYLE: Any = {
     "ytick.labelsize": 7.5,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
+    "axes.formatter.useoffset": False,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "figure.facecolor": PAPER.light,
@@ -212,6 +214,7 @@ def _log_x(axes: Axes) -> None:
 
 
 def _panel(axes: Axes, panel: Panel, x_factor: float) -> None:
+    panel = from_near(panel)
     factor, text = y_scale(panel)
     if panel.log:
         axes.set_yscale("log")

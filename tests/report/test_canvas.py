@@ -27,12 +27,42 @@ def test_a_flat_row_of_points_stands_clear_of_the_upper_end():
     assert high > 0.88 * 1.03
 
 
-@pytest.mark.parametrize("values", [(0.0, 1.0), (4.3668, 4.3688), (-1234.51, -1234.48)])
+@pytest.mark.parametrize(
+    "values",
+    [
+        (0.0, 1.0),
+        (4.3668, 4.3688),
+        (-1234.51, -1234.48),
+        (-1234.51, -1234.26),
+        (-1234.51, -1233.5),
+        (4.36877, 4.3687700001),
+        (4.36877, np.nextafter(4.36877, 5)),
+    ],
+)
 def test_the_name_of_y_stands_clear_of_its_numbers(values):
     drawn = axes(Series(x=[0, 1], y=values, mark="joined"))
     numbers = [one.get_window_extent().x0 for one in drawn.get_yticklabels()]
     name = drawn.yaxis.label.get_window_extent()
     assert 0 < name.x0 and name.x1 < min(numbers)
+
+
+def test_numbers_that_differ_in_late_digits_are_told_less_a_round_one():
+    """Above the axis stood "1e-7+4.36877", and its numbers were those times that."""
+    y = [4.36877012, 4.36877031]
+    panel = Panel(
+        label="tau", unit="s", series=(Series(x=[0, 1], y=y, mark="joined"),),
+        guides=(Guide(at=4.3687702, along="x", text="mean"), Guide(at=0.5)),
+    )  # fmt: skip
+    drawn = draw(Plot(name="x", caption="x.", x_label="Run", panels=(panel,)), "x")
+    (one,) = drawn.axes
+    assert one.get_ylabel() == "tau less 4.36877 s (ns)"
+    assert one.yaxis.get_offset_text().get_text() == ""
+    mean, upright, line = one.lines
+    assert line.get_ydata() == pytest.approx([120, 310])
+    assert mean.get_ydata() == pytest.approx([200, 200])
+    assert upright.get_xdata() == [0.5, 0.5]
+    numbers = [text.get_text() for text in one.get_yticklabels()]
+    assert {"150", "200", "250", "300"} <= set(numbers)
 
 
 def test_what_counts_has_whole_numbers_and_each_of_a_few():
