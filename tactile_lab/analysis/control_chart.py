@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_lab.errors import ParameterError
+from tactile_lab.quantity import ROUNDING
 
 WIDTH = 2.66
 """Mean moving ranges of two from the mean to a limit: three standard deviations of
@@ -51,13 +52,15 @@ def control_chart(values: ArrayLike) -> ControlChart:
         )
     mean = float(found.mean())
     reach = WIDTH * float(np.abs(np.diff(found)).mean())
-    side = np.sign(found - mean)
+    off = found - mean
+    off[np.abs(off) <= ROUNDING * abs(mean)] = 0.0
+    side = np.sign(off)
     length, drifting = 0, []
     for i, here in enumerate(side):
         length = length + 1 if i and here == side[i - 1] and here else 1
         if length >= RUN:
             drifting.append(i)
-    beyond = np.flatnonzero(np.abs(found - mean) > reach)
+    beyond = np.flatnonzero(np.abs(off) > reach)
     return ControlChart(
         mean,
         mean - reach,

@@ -51,6 +51,12 @@ def test_what_jumps_and_what_drifts_is_told():
     assert "All lie within, and none drifts." in still.sentences
 
 
+def test_equal_values_lie_within_and_do_not_drift():
+    """Their mean differs from them in its last digit: all were told as outside."""
+    same = OverRuns.of("rest_V_C1", "V", points([4.36877] * 12))
+    assert same.sentences[-1] == "All lie within, and none drifts."
+
+
 def test_what_lies_outside_is_not_told_as_a_limit():
     values = [8.6900, 8.6901] * 6
     found = OverRuns.of("tau", "s", points([*values, 8.69045]))
