@@ -151,7 +151,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             message += f" See `{refused.ctx.command_path} --help`."
         terminal.say(f"tactile-lab: {message}", sys.stderr)
         code = refused.exit_code
-    except click.Abort:
+    except (click.Abort, KeyboardInterrupt):
         code = INTERRUPTED
     except BrokenPipeError:
         code = 1  # nobody reads on: no message, no traceback

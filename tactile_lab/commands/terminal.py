@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn, TextIO
@@ -112,7 +112,8 @@ def reading(run: Path) -> Iterator[None]:
     """
     with refusing():
         try:
-            yield
+            with _as_signalled():
+                yield
         except (TactileLabError, click.exceptions.Exit):
             raise
         except Exception as error:
@@ -211,11 +212,27 @@ def minded(handlers: Mapping[int, Any]) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def leaving_tidily() -> AbstractContextManager[None]:
+@contextmanager
+def leaving_tidily() -> Iterator[None]:
     """Within, SIGTERM and SIGHUP let what is being written be cleared away first."""
     ours = threading.current_thread() is threading.main_thread()
     unminded = (n for n in ENDING if ours and signal.getsignal(n) == signal.SIG_DFL)
-    return minded(dict.fromkeys(unminded, leave))
+    with minded(dict.fromkeys(unminded, leave)), _as_signalled():
+        yield
+
+
+@contextmanager
+def _as_signalled() -> Iterator[None]:
+    """Within, a signal that met compiled code raises what it raises elsewhere.
+
+    Numba returns what it computed, so that Python raises a SystemError of both.
+    """
+    try:
+        yield
+    except SystemError as both:
+        if isinstance(both.__cause__, SystemExit | KeyboardInterrupt):
+            raise both.__cause__ from None
+        raise
 
 
 @contextmanager

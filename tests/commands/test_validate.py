@@ -1,6 +1,36 @@
 """The verbs that measure the solver, on the shortest of their work."""
 
+import os
 import re
+import signal
+import subprocess
+import sys
+
+import pytest
+
+MET_IN_COMPILED_CODE = """
+import ctypes
+import signal
+import sys
+
+import numpy as np
+from numba import njit
+
+from tactile_lab.cli import main
+from tactile_lab.validation import accuracy
+
+come = ctypes.CDLL(None)["raise"]
+come.argtypes, come.restype = [ctypes.c_int], ctypes.c_int
+
+@njit
+def solve(number):
+    come(number)
+    return 1, np.zeros(3), 1.0, 2
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # may be ignored, as by nohup
+accuracy.compete = lambda *_, **__: solve(int(sys.argv[1]))
+main(["validate", "accuracy"])
+"""
 
 
 def test_the_verbs_are_in_the_help(tactile_lab):
@@ -50,3 +80,16 @@ def test_a_scene_that_is_none_is_refused(tactile_lab):
     answer = tactile_lab("validate", "accuracy", "--scene", "nonsense")
     assert answer.code == 2
     assert "choose from pulses" in answer.err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_that_meets_compiled_code_ends_as_elsewhere(name):
+    """A SystemError of numba's was printed with its trace, and the exit code was 1."""
+    number = getattr(signal, name)
+    done = subprocess.run(
+        [sys.executable, "-c", MET_IN_COMPILED_CODE, str(int(number))],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 128 + number, done.stderr
+    assert "Error" not in done.stderr and "Traceback" not in done.stderr
