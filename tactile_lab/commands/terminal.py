@@ -11,6 +11,7 @@ import signal
 import sys
 import threading
 import time
+from _thread import interrupt_main
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -36,6 +37,8 @@ ENDING = tuple(
 )
 """Signals that end a program, of those that this system has."""
 
+SOON = 0.001
+"""Seconds between looks whether a signal that was lost can come again."""
 PATIENCE = 10.0
 """Seconds that piped work may take unmentioned."""
 REDRAW_EVERY = 0.1
@@ -217,8 +220,51 @@ def leaving_tidily() -> Iterator[None]:
     """Within, SIGTERM and SIGHUP let what is being written be cleared away first."""
     ours = threading.current_thread() is threading.main_thread()
     unminded = (n for n in ENDING if ours and signal.getsignal(n) == signal.SIG_DFL)
-    with minded(dict.fromkeys(unminded, leave)), _as_signalled():
+    with minded(dict.fromkeys(unminded, leave)), _heard_again(), _as_signalled():
         yield
+
+
+@contextmanager
+def _heard_again() -> Iterator[None]:
+    """Within, a signal that an object's end swallowed comes again when that is over."""
+    told = sys.unraisablehook
+
+    def again(lost: sys.UnraisableHookArgs) -> None:
+        number = _number(lost.exc_value)
+        if number is None:
+            told(lost)
+            return
+        if signal.getsignal(number) == signal.SIG_DFL:  # it left already, in vain
+            signal.signal(number, leave)
+        threading.Thread(target=send, args=[number], daemon=True).start()
+
+    def send(number: signal.Signals) -> None:
+        main = threading.main_thread().ident or 0
+        frames = sys._current_frames  # noqa: SLF001 (documented all the same)
+        while _runs(again, frames().get(main)):
+            time.sleep(SOON)  # it would be lost within, too
+        interrupt_main(number)
+
+    sys.unraisablehook = again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = told
+
+
+def _runs(function: Callable[..., Any], frame: FrameType | None) -> bool:
+    """Whether `function` is among those that run in a thread whose frame that is."""
+    while frame is not None and frame.f_code is not function.__code__:
+        frame = frame.f_back
+    return frame is not None
+
+
+def _number(ending: BaseException | None) -> signal.Signals | None:
+    """The signal that raised it; None for what no signal raises."""
+    if isinstance(ending, KeyboardInterrupt):
+        return signal.SIGINT
+    code = ending.code if isinstance(ending, SystemExit) else None
+    return next((number for number in ENDING if code == 128 + number), None)
 
 
 @contextmanager
@@ -267,6 +313,7 @@ def _noting_endings() -> Iterator[Callable[[], None]]:
         sys.unraisablehook = untold
         try:
             yield look
+            look()
         finally:
             sys.unraisablehook = told
 

@@ -238,6 +238,67 @@ main(sys.argv[1:])
     assert not (tmp_path / "out").is_file()
 
 
+SWALLOWED = """
+import os
+import signal
+import sys
+import time
+from tactile_lab.cli import main
+from tactile_lab.store.export import csv
+from tactile_lab.store.run import Run
+from tactile_lab.store.selection import Selection
+
+class Ends:
+    def __del__(self):
+        os.kill(os.getpid(), signal.{name})
+
+def wait():
+    until = time.monotonic() + {wait}
+    while time.monotonic() < until:
+        pass
+
+def met(method):
+    def ends(*arguments):
+        Ends()
+        wait()
+        return method(*arguments)
+    return ends
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # may be ignored, as by nohup
+{meets}
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("meets", ["Run.load", "Selection.check"])
+def test_a_signal_that_an_objects_end_swallowed_ends_it_without_progress(
+    complete, tmp_path, name, meets
+):
+    """It was lost before the progress began, and the export went on."""
+    done = export_to_csv(complete, tmp_path / "out", name, meets, wait=60)
+    assert done.returncode == 128 + getattr(signal, name), done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
+def test_a_signal_that_is_swallowed_after_the_last_update_is_heeded(complete, tmp_path):
+    done = export_to_csv(complete, tmp_path / "out", "SIGTERM", "csv.tables", wait=0)
+    assert done.returncode == 128 + signal.SIGTERM, done.stderr
+    assert done.stdout == done.stderr == ""
+
+
+def export_to_csv(run, out, name, meets, *, wait):
+    """The program, ended: a signal meets an object's end where that is called."""
+    program = SWALLOWED.format(name=name, meets=f"{meets} = met({meets})", wait=wait)
+    return subprocess.run(
+        [sys.executable, "-c", program, "export", run, "--to", "csv", "--out", out],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
 TOLD_TO_END = """
 import os
 import signal
