@@ -116,12 +116,11 @@ def _of_run(run: Path, form: str, out: Path | None, selection: Selection) -> lis
                     sys.stderr,
                 )
         size = module.size(loaded, selection)
-        most = "up to" if FORMATS[form].bounded else "about"
-        text = f"writing {target.name}, {most} {bytes_text(size)}"
+        text = f"writing {target.name}, about {bytes_text(size)}"
         if size >= LARGE:
             say(text, sys.stderr)
         with progress(text) as update:
-            written: list[Path] = module.export(loaded, target, selection, update)
+            written: list[Path] = module.export(loaded, target, selection, update, size)
     return written
 
 

@@ -29,7 +29,6 @@ class Format:
         spikes: module that writes spikes alone, in `tactile_lab.neuro`.
         script: whether it is a script that plays the spikes, with a file of them.
         fixed: what a run is written to beside its data, where it is not called like it.
-        bounded: whether the size told beforehand is the most that it may take.
     """
 
     ending: str
@@ -37,7 +36,6 @@ class Format:
     spikes: str = ""
     script: bool = False
     fixed: str = ""
-    bounded: bool = False
 
     def beside(self, run: str) -> str:
         """Name of the file or folder that a run of this name is written to."""
@@ -48,9 +46,9 @@ FORMATS = {
     "csv": Format(".csv", run="csv", spikes="lines", fixed="csv"),
     "mat": Format(".mat", run="mat"),
     "netcdf": Format(".nc", run="netcdf"),
-    "parquet": Format(".parquet", run="parquet", fixed="parquet", bounded=True),
+    "parquet": Format(".parquet", run="parquet", fixed="parquet"),
     "ro-crate": Format(".zip", run="ro_crate", fixed="ro-crate-metadata.json"),
-    "nwb": Format(".nwb", run="nwb", spikes="nwb", bounded=True),
+    "nwb": Format(".nwb", run="nwb", spikes="nwb"),
     "neo": Format(".nix", spikes="neo"),
     "tonic": Format(".npy", spikes="tonic"),
     "aedat4": Format(".aedat4", spikes="aedat4"),

@@ -15,11 +15,12 @@ from full_disk import full_after
 from tactile_lab.cli import cli
 from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import RunFolderError
+from tactile_lab.neuro.formats import of_whole_run
 from tactile_lab.scene.load import load
 from tactile_lab.store.export import csv as to_csv
 from tactile_lab.store.export import mat as to_mat
 from tactile_lab.store.export import netcdf as to_netcdf
-from tactile_lab.store.export import ro_crate
+from tactile_lab.store.export import packed, ro_crate
 from tactile_lab.store.export.content import about
 from tactile_lab.store.export.lines import fixed, steps, written
 from tactile_lab.store.folder import lock, read_info, write_info
@@ -389,9 +390,41 @@ def test_numbers_as_text():
 
 
 @pytest.mark.parametrize("part", [{}, {"signals": ("V_C1",)}, {"rate": 10e3}])
-def test_what_netcdf_will_take_is_told_as_it_is(run, tmp_path, part):
-    """It was told twenty times too large, and refused where there was room."""
+@pytest.mark.parametrize("form", ["mat", "netcdf", "nwb", "parquet"])
+def test_what_a_format_will_take_is_told_as_it_is(run, tmp_path, form, part):
+    """It was told up to twenty times too large, and refused where there was room."""
+    told, takes = told_and_taken(run, tmp_path / "out", form, Selection(**part))
+    assert takes <= told < 1.5 * takes
+
+
+@pytest.mark.parametrize("form", ["netcdf", "nwb", "parquet"])
+def test_what_is_told_of_a_long_run_by_stretches_is_not_less(
+    run, tmp_path, form, monkeypatch
+):
+    monkeypatch.setattr(packed, "PROBES", 2)
+    monkeypatch.setattr(packed, "PROBED", run.samples // 3)
+    told, takes = told_and_taken(run, tmp_path / "out", form, Selection())
+    assert takes <= told < 1.5 * takes
+
+
+def told_and_taken(run, out, form, selection):
+    """Bytes told beforehand, and those of what was written."""
+    for library in ("h5netcdf", "pynwb", "pyarrow"):
+        pytest.importorskip(library)
+    if form == "nwb" and selection.rate:
+        pytest.skip("NWB holds samples as stored")
+    module = of_whole_run(form)
+    written = module.export(run, out, selection)
+    return module.size(run, selection), sum(one.stat().st_size for one in written)
+
+
+def test_how_much_it_takes_is_reckoned_once(folder, tmp_path, monkeypatch):
+    """Of netCDF stretches were packed to tell it, and again to see if there is room."""
     pytest.importorskip("h5netcdf")
-    (file,) = to_netcdf.export(run, tmp_path / "run.nc", Selection(**part))
-    takes, told = file.stat().st_size, to_netcdf.size(run, Selection(**part))
-    assert takes / 2 < told < 2 * takes
+    reckoned, whole = [], to_netcdf.size
+    monkeypatch.setattr(
+        to_netcdf, "size", lambda *of: reckoned.append(of) or whole(*of)
+    )
+    asked = ["export", str(folder), "--to", "netcdf", "--out", str(tmp_path / "run.nc")]
+    assert CliRunner().invoke(cli, asked).exit_code == 0
+    assert len(reckoned) == 1

@@ -47,11 +47,17 @@ def size(run: Run, selection: Selection) -> int:
 
 
 def export(
-    run: Run, folder: Path, selection: Selection, progress: Progress = nothing
+    run: Run,
+    folder: Path,
+    selection: Selection,
+    progress: Progress = nothing,
+    room: int | None = None,
 ) -> list[Path]:
     """Write `signals.csv`, `spikes.csv`, `trials.csv`, `about.csv`, ... into `folder`.
 
     Files of these names that an earlier export left there are replaced or removed.
+
+    `room` bytes must be free for it, as `size` tells unless given.
 
     Raises:
         RunFolderError: a signal, rate or time the run does not have.
@@ -59,9 +65,10 @@ def export(
         OSError: the folder cannot be written.
     """
     selection.check(run)
+    room = size(run, selection) if room is None else room
     made = []
     if selection.rows(run):
-        made.append(_signals(run, folder / "signals.csv", selection, progress))
+        made.append(_signals(run, folder / "signals.csv", selection, progress, room))
     for name, table in tables(run, selection).items():
         made.append(_table(folder / f"{name}.csv", table))
     told = about(run, selection)
@@ -73,12 +80,14 @@ def export(
     return made
 
 
-def _signals(run: Run, path: Path, selection: Selection, progress: Progress) -> Path:
+def _signals(
+    run: Run, path: Path, selection: Selection, progress: Progress, room: int
+) -> Path:
     names, rows = selection.names(run), selection.rows(run)
     texts = [_text(run, name, selection) for name in names]
     done = 0
     with (
-        replacing(path, size(run, selection)) as part,
+        replacing(path, room) as part,
         part.open("wb") as file,
         ThreadPoolExecutor() as threads,
     ):

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.io
 
 from tactile_lab.errors import RunFolderError
+from tactile_lab.store.export import packed
 from tactile_lab.store.export.content import (
     ExportTable,
     about,
@@ -31,17 +32,24 @@ DOUBLE, SINGLE = 8, 4
 
 def size(run: Run, selection: Selection) -> int:
     """Bytes the file will take, at most."""
-    return selection.rows(run) * (DOUBLE + SINGLE * len(selection.names(run)))
+    signals = selection.rows(run) * (DOUBLE + SINGLE * len(selection.names(run)))
+    return signals + packed.listed(run, selection)
 
 
 def export(
-    run: Run, file: Path, selection: Selection, progress: Progress = nothing
+    run: Run,
+    file: Path,
+    selection: Selection,
+    progress: Progress = nothing,
+    room: int | None = None,
 ) -> list[Path]:
     """Write `file`: time (s), and structs of values (single, SI) and unit.
 
     Tables are structs of their columns, with a struct `units` of the same names.
 
     Signals are not compressed: that would take a minute.
+
+    `room` bytes must be free for it, as `size` tells unless given.
 
     Raises:
         RunFolderError: more samples than the format can hold, or a signal, rate or
@@ -50,6 +58,7 @@ def export(
         OSError: the file cannot be written.
     """
     selection.check(run)
+    room = size(run, selection) if room is None else room
     rows, names = selection.rows(run), selection.names(run)
     if DOUBLE * rows > LARGEST:
         raise RunFolderError(
@@ -57,7 +66,7 @@ def export(
             f"({LARGEST // DOUBLE:.3g}). Choose a part with --from and --until, or "
             "--rate."
         )
-    with replacing(file, size(run, selection)) as part, part.open("wb") as out:
+    with replacing(file, room) as part, part.open("wb") as out:
 
         def put(name: str, value: Any) -> None:
             # the stubs know no open file

@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from tactile_lab.signals import SIGNALS
+from tactile_lab.store.export import packed
 from tactile_lab.store.export.content import (
     about,
     tables,
@@ -24,39 +25,33 @@ from tactile_lab.whole_file import replacing
 
 PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 CHUNK = 1 << 18
-PROBES, PROBED = 4, 1 << 16
-"""Stretches that are packed to see what the whole takes, and rows of each."""
-COLUMN = 2_000
-"""Bytes that HDF5 takes for a column beside its values."""
 
 
 def size(run: Run, selection: Selection) -> int:
-    """Bytes the file will take, about, as stretches of the signals do when packed.
-
-    How much compression leaves depends on the run: a twentieth of one that rests.
-    """
+    """Bytes the file will take, rather fewer, as stretches of it tell."""
     h5netcdf = library("h5netcdf")
-    rows, packed = 0, 0
-    for probe in selection.stretches(run, PROBES, PROBED):
+
+    def pack(probe: Selection) -> int:
         memory = BytesIO()
         with h5netcdf.File(memory, "w") as out:
             _signals(out, run, probe, nothing)
-        with h5py.File(memory, "r") as made:
-            packed += sum(column.id.get_storage_size() for column in made.values())
-        rows += probe.rows(run)
-    signals = packed * selection.rows(run) // max(rows, 1)
-    columns = (table.columns for table in tables(run, selection).values())
-    listed = sum(it.nbytes + COLUMN for each in columns for it in each.values())
-    told = sum(len(str(text)) for text in about(run, selection).values())
-    return signals + listed + told
+        return memory.getbuffer().nbytes
+
+    return packed.signals(run, selection, pack) + packed.listed(run, selection)
 
 
 def export(
-    run: Run, file: Path, selection: Selection, progress: Progress = nothing
+    run: Run,
+    file: Path,
+    selection: Selection,
+    progress: Progress = nothing,
+    room: int | None = None,
 ) -> list[Path]:
     """Write `file`: signals against the coordinate time, a group per table.
 
     Stored signals are codes with `scale_factor` and `add_offset`, unless averaged.
+
+    `room` bytes must be free for it, as `size` tells unless given.
 
     Raises:
         RunFolderError: h5netcdf is not installed, or a signal, rate or time the run
@@ -66,8 +61,9 @@ def export(
     """
     h5netcdf = library("h5netcdf")
     selection.check(run)
+    room = size(run, selection) if room is None else room
     with (
-        replacing(file, size(run, selection)) as part,
+        replacing(file, room) as part,
         writing(part, progress) as (disk, told),
         h5netcdf.File(disk, "w") as out,
     ):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import datetime
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from tactile_lab.errors import RunFolderError
 from tactile_lab.signals import SIGNALS
 from tactile_lab.spikes.detection import Detection
 from tactile_lab.store.derived import DERIVED, derivation
+from tactile_lab.store.export import packed
 from tactile_lab.store.export.content import (
     ExportTable,
     about,
@@ -45,6 +47,12 @@ EVEN = 1e-3
 
 CHUNK, AT_ONCE = 1 << 16, 1 << 20
 """Samples compressed together, and in memory at once."""
+
+DOUBLE = 8
+EMPTY = 250_000
+"""Bytes of a file without data: the meaning of all that NWB knows is in each."""
+SERIES = 5_000
+"""Bytes of a series beside its data."""
 
 READINGS = {
     "field": "teslameter readings",
@@ -77,15 +85,41 @@ TRIALS = {
 
 
 def size(run: Run, selection: Selection) -> int:
-    """Bytes the file will take, at most."""
-    stored = [run.signal(n) for n in selection.names(run) if n in run.signals]
-    return sum(selection.rows(run) * int(s.codes.dtype.itemsize) for s in stored)
+    """Bytes the file will take, rather fewer, as stretches of it tell."""
+    names = selection.names(run)
+    stored = [run.signal(name) for name in names if name in run.signals]
+
+    def pack(probe: Selection) -> int:
+        memory = BytesIO()
+        with h5py.File(memory, "w") as out:
+            for signal in stored:
+                parts = [signal.codes[first:stop] for first, stop in probe.spans(run)]
+                codes = np.concatenate(parts)
+                chunks = (min(CHUNK, codes.size),)
+                out.create_dataset(
+                    signal.name, data=codes, chunks=chunks, compression="gzip"
+                )
+        return memory.getbuffer().nbytes
+
+    signals = packed.signals(run, selection, pack) if stored else 0
+    series = len(stored) * len(selection.spans(run))
+    if not run.gapless:
+        signals += len(stored) * selection.rows(run) * DOUBLE
+    for time in (_changes(run, n, selection) for n in names if n not in run.signals):
+        signals += time.size * DOUBLE * (2 if "timestamps" in _times(time) else 1)
+    return EMPTY + SERIES * series + signals + packed.listed(run, selection)
 
 
 def export(
-    run: Run, file: Path, selection: Selection, progress: Progress = nothing
+    run: Run,
+    file: Path,
+    selection: Selection,
+    progress: Progress = nothing,
+    room: int | None = None,
 ) -> list[Path]:
     """Write `file`: codes with conversion and offset, units table, trials, stimulus.
+
+    `room` bytes must be free for it, as `size` tells unless given.
 
     Raises:
         RunFolderError: pynwb is not installed, a rate was asked for, or a signal or
@@ -97,8 +131,9 @@ def export(
     if selection.rate is not None:
         raise RunFolderError("NWB holds the samples as stored; leave out --rate.")
     selection.check(run)
+    room = size(run, selection) if room is None else room
     with (
-        replacing(file, size(run, selection)) as part,
+        replacing(file, room) as part,
         writing(part, progress) as (disk, told),
         h5py.File(disk, "w") as out,
         pynwb.NWBHDF5IO(file=out, mode="w") as writer,
@@ -283,12 +318,7 @@ def _add_derived(pynwb: Any, session: Any, run: Run, selection: Selection) -> No
     for name in selection.names(run):
         if name in run.signals:
             continue
-        if name == "I_DS":
-            time = run.I_DS.time
-            inside = time[selection.holds(time)]
-            time = inside if inside.size else np.array([selection.ends(run)[0]])
-        else:
-            time = changes(run, name, selection)
+        time = _changes(run, name, selection)
         series = pynwb.TimeSeries(
             name=name,
             description=f"{SIGNALS[name].title}, derived: {DERIVED[name]}",
@@ -304,6 +334,15 @@ def _add_derived(pynwb: Any, session: Any, run: Run, selection: Selection) -> No
             name="ecephys", description="signals derived from those recorded"
         )
         module.add(series)
+
+
+def _changes(run: Run, name: str, selection: Selection) -> FloatArray:
+    """Times that a derived signal is told at, s."""
+    if name != "I_DS":
+        return changes(run, name, selection)
+    time = run.I_DS.time
+    inside = time[selection.holds(time)]
+    return inside if inside.size else np.array([selection.ends(run)[0]])
 
 
 def _times(time: FloatArray) -> dict[str, Any]:

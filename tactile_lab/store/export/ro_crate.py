@@ -69,7 +69,11 @@ def size(run: Run, selection: Selection) -> int:
 
 
 def export(
-    run: Run, file: Path, selection: Selection, progress: Progress = nothing
+    run: Run,
+    file: Path,
+    selection: Selection,
+    progress: Progress = nothing,
+    room: int | None = None,
 ) -> list[Path]:
     """Describe the folder in `ro-crate-metadata.json`; as .zip: with all its files.
 
@@ -78,6 +82,7 @@ def export(
         file: the metadata file in the run's folder, or a .zip elsewhere.
         selection: must be the whole run.
         progress: told what part is packed.
+        room: bytes that it takes, as `size` tells where that is not known.
 
     Raises:
         RunFolderError: a part of the run was asked for, or another kind of file.
@@ -104,7 +109,8 @@ def export(
     if file.suffix != ".zip":
         write_text(file, text)
         return [file]
-    files, whole, done = list(_files(run.path)), size(run, selection), 0
+    files, done = list(_files(run.path)), 0
+    whole = size(run, selection) if room is None else room
     with replacing(file, whole) as part, zipfile.ZipFile(part, "w") as packed:
         packed.writestr(METADATA, text, zipfile.ZIP_DEFLATED)
         for one in files:
