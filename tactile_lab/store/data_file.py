@@ -15,9 +15,9 @@ import numpy as np
 from tactile_lab.scope import Stream
 from tactile_lab.store.columns import Column, SampleColumn
 from tactile_lab.store.durable import DiskSync
-from tactile_lab.store.folder import DATA
+from tactile_lab.store.folder import DATA, LEDGER
 from tactile_lab.store.layout import RECORDS, Layout, declare
-from tactile_lab.store.ledger import LEDGER, Ledger
+from tactile_lab.store.ledger import Ledger
 
 
 class DataFile:

@@ -35,12 +35,16 @@ PLANNED = "instruments_planned"
 
 DATA, LOG, SCENE, REPORT = "data.h5", "log.jsonl", "scene.toml", "report.html"
 
+LEDGER = "ledger.bin"
+"""What was written of the data; gone once the run has ended well."""
+
+KEPT = "data.killed.h5"
+"""What the file is called that a crash left, once the run is recovered."""
+
 INPUTS = "inputs"
 """Folder within a run for copies of what it was made from."""
 
-OWN = frozenset(
-    (INFO, DATA, LOG, SCENE, "data.killed.h5", "ledger.bin", "remarks.json")
-)
+OWN = frozenset((INFO, DATA, LOG, SCENE, KEPT, LEDGER, "remarks.json"))
 """Files that a run is made of: nothing makes them again."""
 
 NAMED = 3
@@ -245,7 +249,9 @@ def _give_one(path: Path) -> str:
 
 def has_lost_data(path: Path, info: Mapping[str, Any]) -> bool:
     """Whether a run's samples were written, and their file is there no more."""
-    return bool(info.get("samples")) and not (path / DATA).exists()
+    if (path / DATA).exists() or (path / KEPT).exists():
+        return False
+    return bool(info.get("samples")) or (path / LEDGER).exists()
 
 
 def told_status(path: Path, status: str) -> str:

@@ -22,9 +22,6 @@ from numpy.typing import NDArray
 
 from tactile_lab.store.layout import RECORDS
 
-LEDGER = "ledger.bin"
-"""Name in a run's folder; gone once the run has ended well."""
-
 CHUNK = np.dtype(
     [("offset", "<u8"), ("size", "<u4"), ("samples", "<u4"), ("crc32", "<u4")]
 )

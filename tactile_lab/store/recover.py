@@ -21,6 +21,8 @@ from tactile_lab.store.data_file import open_data
 from tactile_lab.store.folder import (
     CHANGED,
     DATA,
+    KEPT,
+    LEDGER,
     RESERVE,
     as_written,
     is_live,
@@ -28,7 +30,7 @@ from tactile_lab.store.folder import (
     write_info,
 )
 from tactile_lab.store.layout import RECORDS
-from tactile_lab.store.ledger import LEDGER, LedgerContents, goes_on, read_ledger
+from tactile_lab.store.ledger import LedgerContents, goes_on, read_ledger
 from tactile_lab.store.progress import Progress, nothing, share
 from tactile_lab.store.run import Run
 from tactile_lab.whole_file import check_space, failing_as
@@ -37,9 +39,6 @@ ELSEWHERE = (
     "Copy it to where there is room and the right to write, and recover it there."
 )
 """What to do with a run that cannot be written where it is."""
-KEPT = "data.killed.h5"
-"""What the file is called that the crash left."""
-
 FILLING = 0.6
 """Part of the work until the samples are copied; then spikes are searched twice."""
 

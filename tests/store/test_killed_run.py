@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from tactile_lab.errors import RecordingError, RunFolderError
+from tactile_lab.store.catalogue import summary
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.recover import recover
 from tactile_lab.store.run import Run
@@ -101,6 +102,15 @@ def test_a_killed_run_keeps_all_but_the_block_in_flight(bench, killed_run, after
         assert picture.high.max() == signal_[:].max()
     with pytest.raises(RunFolderError, match="not cut short"):
         recover(path)
+
+
+def test_a_killed_run_whose_data_was_deleted_had_samples(killed_run):
+    """It was said to have been cut short before its first sample."""
+    path, _ = killed_run()
+    (path / "data.h5").unlink()
+    assert summary(path).status == "data gone"
+    with pytest.raises(RunFolderError, match="moved or deleted"):
+        Run.load(path)
 
 
 @pytest.mark.parametrize("byte", [3, 25, 33, 37, 200])

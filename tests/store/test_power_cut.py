@@ -11,11 +11,11 @@ import pytest
 from tactile_lab.errors import RecordingError
 from tactile_lab.store import ledger
 from tactile_lab.store.durable import DiskSync
-from tactile_lab.store.folder import DATA, RunFolder
+from tactile_lab.store.folder import DATA, KEPT, LEDGER, RunFolder
 from tactile_lab.store.layout import Layout
-from tactile_lab.store.ledger import LEDGER, Ledger, read_ledger
+from tactile_lab.store.ledger import Ledger, read_ledger
 from tactile_lab.store.recorder import Recorder
-from tactile_lab.store.recover import KEPT, recover
+from tactile_lab.store.recover import recover
 from tactile_lab.store.run import Run
 from tactile_lab.store.verify import verify
 
