@@ -75,13 +75,12 @@ def command(
             }
         )
         return
-    for name, estimate, unit in (
-        ("I_S", fit.I_S, "A"),
-        ("m", fit.m, ""),
-        ("swing", fit.swing, "V/decade"),
+    for name, told in (
+        ("I_S", fit.I_S.shown("A")),
+        ("m", fit.m.text("")),
+        ("swing", fit.swing.text("mV/decade", 1e3)),
     ):
-        interval = f"{show(estimate.low, unit)} to {show(estimate.high, unit)}"
-        say(f"{name:6} {show(estimate.value, unit)}  ({interval}, 95 %)")
+        say(f"{name:6} {told}")
     low, high = fit.range
     beside = "" if fit.leakage is None else f", {show(fit.leakage, 'A', 2)} beside it"
     say(f"from {fit.points} points between {low:g} V and {high:g} V{beside}")

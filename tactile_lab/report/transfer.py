@@ -7,24 +7,21 @@ import numpy as np
 from tactile_lab.analysis.transfer import Transfer
 from tactile_lab.analysis.transfer_file import Curve
 from tactile_lab.plot import Guide, Panel, Plot, Series
-from tactile_lab.quantity import show
 
 
 def transfer_plot(curve: Curve, fit: Transfer) -> Plot:
-    """Measured points, the fitted line, and where it was fitted."""
+    """Measured points, the fitted line, and which of them tell it."""
     seen = curve.I_DS > 0
     end = min(curve.V_GS.max(), fit.range[1] + 0.3)
     volts = np.linspace(curve.V_GS.min(), end, 50)
     fitted = (
-        f"I_S = {show(fit.I_S.value, 'A', 3)} ({show(fit.I_S.low, 'A', 3)} to "
-        f"{show(fit.I_S.high, 'A', 3)})",
-        f"m = {fit.m.value:.4g} ({fit.m.low:.4g} to {fit.m.high:.4g})",
-        f"swing = {fit.swing.value * 1e3:.1f} mV/decade "
-        f"({fit.swing.low * 1e3:.1f} to {fit.swing.high * 1e3:.1f})",
+        f"I_S = {fit.I_S.shown('A')}",
+        f"m = {fit.m.text('')}",
+        f"swing = {fit.swing.text('mV/decade', 1e3)}",
     )
     return Plot(
         name="transfer",
-        caption="Drain current against V_GS; shaded: where it was fitted.",
+        caption="Drain current against V_GS; shaded: the points that tell the line.",
         x_label="V_GS",
         x_unit="V",
         panels=(
