@@ -262,8 +262,9 @@ in the model alone:
 
 {operating_points(trimmed)}
 
-Eq. (15) with V_P(t) misses the rates by {fig5b["conclusion"]["rms_Hz"] * 1e3:.2g} mHz
-rms. The fit alpha exp(beta t) + gamma gives alpha =
+Fitted to the intervals, over which C_2 charges while V_P(t) falls, the circuit's law
+misses the rates by {fig5b["conclusion"]["rms_Hz"] * 1e3:.2g} mHz rms; Eq. (15), the
+line, is the rate of each instant. The fit alpha exp(beta t) + gamma gives alpha =
 {fit["alpha_Hz"]["value"]:.3g} Hz, beta = {fit["beta_per_s"]["value"]:.3g} /s, gamma =
 {fit["gamma_Hz"]["value"]:.3g} Hz, R² = {fit["r_squared"]:.3f}. It is a description:
 the dots leave it at both ends, and at the end the rate falls to silence instead of to

@@ -95,9 +95,10 @@ class Hold(ForceProtocol):
             name="summary",
             title="adaptation",
             caption="Instantaneous rate during the hold, each 1/ISI in the middle of "
-            "its interval, as in Fig. 5c; line: Eq. (15) with V_P(t), fitted to the "
-            "spikes and the silence; dashed: α exp(βt) + γ, as in the paper, up to the "
-            "last spike.",
+            "its interval, as in Fig. 5c; line: Eq. (15) at each instant, with the "
+            "V_P(t) fitted to the spikes and the silence (at the end V_C2 comes behind "
+            "and an interval lasts longer); dashed: α exp(βt) + γ, as in the paper, up "
+            "to the last spike.",
             x_label="Time from the start of the hold",
             x_unit="s",
             panels=(
