@@ -75,8 +75,7 @@ class RunCard(QFrame):
         first = row((Elided(star + (entry.title or entry.name), "strong"), 1))
         first.addWidget(label(word, role), 0, Qt.AlignmentFlag.AlignVCenter)
         kind = {True: "sim", False: "bench", None: "?"}[entry.simulated]
-        length = "—" if entry.duration is None else minutes(entry.duration)
-        when = f"{day(entry.started)} · {length} · {kind}"
+        when = f"{day(entry.started)} · {_length(entry)} · {kind}"
         self._signs = [QLabel(self), QLabel(self)]  # without, one shown is a window
         self._signs[0].setToolTip("On screen")
         self._signs[1].setToolTip("\n".join(entry.notes))
@@ -168,6 +167,15 @@ def told(entry: RunSummary) -> list[str]:
     }
     found = [f"{name} {value}".strip() for name, value in values.items() if value]
     return [*found, *entry.notes]
+
+
+def _length(entry: RunSummary) -> str:
+    """How long a run took, or that there is nothing of it."""
+    if entry.duration is not None:
+        return minutes(entry.duration)
+    # its card is not made anew as the first sample of one that goes on is written
+    over = entry.status != "running" and not entry.trouble
+    return "none recorded" if over and not entry.recorded else "—"
 
 
 def day(started: str) -> str:

@@ -15,7 +15,7 @@ from gui.look.theme import Theme
 from gui.record.progress import ENDS
 from gui.review.run_card import PILLS, RunCard, differing
 from gui.review.runs import PAGE, RunsView
-from tactile_lab.store.folder import RunFolder
+from tactile_lab.store.folder import DATA, RunFolder
 from tactile_lab.store.summary import RunSummary
 
 
@@ -235,6 +235,25 @@ def test_pages_go_from_run_to_run(runs: RunsView, qtbot) -> None:
             assert 1 < abs(at - before) < 8 or at == last, "as many as are seen"
             seen = runs.cards[at].visibleRegion().boundingRect()
             assert seen == runs.cards[at].rect()
+
+
+def test_a_run_killed_before_its_first_sample_says_that_nothing_was_recorded(
+    runs: RunsView, tmp_path: Path
+) -> None:
+    """As `tactile-lab runs` says; "—" stood there as of one with samples."""
+    (tmp_path / DATA).touch()
+    killed = summary("a", "Pulses", "cut short")
+    kept = replace(killed, name="b", folder=tmp_path)
+    going_on = summary("c", "Pulses", "running")
+    runs.show_entries([killed, kept, going_on])
+    told = {card.entry.name: lengths(card) for card in runs.cards}
+    assert told == {"a": ["none recorded"], "b": ["—"], "c": ["—"]}
+
+
+def lengths(card: RunCard) -> list[str]:
+    """What stands between when a run began and whether it is simulated."""
+    texts = (one.text() for one in card.findChildren(QLabel))
+    return [text.split(" · ")[1] for text in texts if text.endswith(" · ?")]
 
 
 def test_runs_of_a_protocol_say_in_what_they_differ(runs: RunsView) -> None:
