@@ -21,6 +21,7 @@ from gui.plots.numbers import nice_range
 from gui.plots.plot_box import Box
 from tactile_lab.arrays import FloatArray
 from tactile_lab.plot import Guide, Panel, Plot, Series, grid, y_scale, z_scale
+from tactile_lab.report.near import from_near
 
 LEFT, FOOT, LOW, HEAD = 48, 36, 20, 22
 """Width of an axis; heights of one with its name, without it, and of a heading, px."""
@@ -77,13 +78,17 @@ class _Heading(pg.LabelItem):  # type: ignore[misc]
 
 
 class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
-    """One panel; values on its axes are those shown, or their logarithms."""
+    """One panel; values on its axes are those shown, or their logarithms.
+
+    Attributes:
+        panel: as it is drawn, perhaps less a round number.
+    """
 
     def __init__(
         self, plot: Plot, panel: Panel, tokens: Tokens, ratio: float, foot: int
     ) -> None:
         super().__init__()
-        self._plot, self._panel = plot, panel
+        self._plot, self.panel = plot, (panel := from_near(panel))
         self._tokens, self._ratio = tokens, ratio
         x_by, x_text = plot.x_scale()
         y_by, y_text = y_scale(panel)
@@ -129,14 +134,14 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         """What the nearest point stands for, or else the cell below; -1 for nothing."""
         wide, high = self.box.viewPixelSize()
         nearest, found = REACH, -1
-        for s in self._panel.series:
+        for s in self.panel.series:
             if not s.of or s.mark == "cells":
                 continue
             x, y = self._x(s.x) - place.x(), self._y(s.y) - place.y()
             far = np.nan_to_num(np.hypot(x / wide, y / high), nan=np.inf)
             if far.min() < nearest:
                 nearest, found = float(far.min()), s.of[int(far.argmin())]
-        maps = (s for s in self._panel.series if s.of and s.mark == "cells")
+        maps = (s for s in self.panel.series if s.of and s.mark == "cells")
         for s in maps if found < 0 else ():
             found = cell_at(s, place.x() / self._x_by, place.y() / self._y_by)
         return found
@@ -145,7 +150,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         plot = self._plot
         if plot.x_limits is not None:
             return [float(self._x(limit)) for limit in plot.x_limits]
-        panels = (self._panel,) if plot.beside else plot.panels
+        panels = (self.panel,) if plot.beside else plot.panels
         drawn = [s for p in panels for s in p.series]
         across = [self._x(v) for s in drawn for v in _along_x(s)]
         if any(s.mark == "cells" for s in drawn):  # no air about a map
@@ -156,7 +161,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         )
 
     def _y_range(self) -> list[float]:
-        panel = self._panel
+        panel = self.panel
         for s in panel.series:
             if s.mark == "cells":
                 edges = self._y(grid(s)[1])
@@ -182,14 +187,14 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
     def _heading(self, text: str) -> str:
         """What is along y, mark and name of each series, and what the panel is of."""
         parts = [_rich(text, self._tokens.muted)]
-        for s in self._panel.series:
+        for s in self.panel.series:
             if s.mark == "cells":
                 parts.append(self._colours(s))
             elif s.name:
                 mark = _rich(GLYPHS.get(s.mark, "—"), self._colour(s.colour))
                 parts.append(f"{mark}&nbsp;{_rich(s.name, self._tokens.text)}")
-        if self._panel.note:
-            parts.append(_rich(self._panel.note, self._tokens.muted))
+        if self.panel.note:
+            parts.append(_rich(self.panel.note, self._tokens.muted))
         return " &nbsp; ".join(parts)
 
     def _colours(self, s: Series) -> str:
@@ -301,7 +306,7 @@ class PanelItem(pg.GraphicsLayout):  # type: ignore[misc]
         sides: dict[str, FloatArray] = {}
         for values, half, shown, log, ends in (
             (s.x, s.x_error, self._x, self._plot.x_log, ("left", "right")),
-            (s.y, s.y_error, self._y, self._panel.log, ("bottom", "top")),
+            (s.y, s.y_error, self._y, self.panel.log, ("bottom", "top")),
         ):
             # one that reaches 0 leaves a logarithmic panel, and is not left out
             least = BELOW * np.abs(values) if log else -np.inf

@@ -77,7 +77,10 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         same = (
             plot is not None and self.plot is not None and self.plot.name == plot.name
         )
-        looked = [one.box.viewRange() if one.box.moved else None for one in self.panels]
+        looked = [
+            (one.panel.label, one.box.viewRange()) if one.box.moved else None
+            for one in self.panels
+        ]
         self.plot = plot
         if plot is not None and self._fixed is None:
             shown = plot.title or ", ".join(panel.label for panel in plot.panels)
@@ -85,9 +88,10 @@ class SmallPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             self.setToolTip(plot.caption)
             self.setMinimumHeight(sum(_heights(plot)))
         self.draw()
-        for panel, part in zip(self.panels, looked, strict=False):
-            if same and part is not None:
-                panel.box.setRange(xRange=part[0], yRange=part[1], padding=0)
+        for one, part in zip(self.panels, looked, strict=False):
+            if same and part is not None and part[0] == one.panel.label:
+                across, up = part[1]
+                one.box.setRange(xRange=across, yRange=up, padding=0)
 
     def sizeHint(self) -> QSize:
         """As high as its panels need; Qt would ask for room for a whole picture."""

@@ -10,12 +10,13 @@ import numpy as np
 import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import QPoint, QPointF, QRect, QRectF, Qt
-from PySide6.QtGui import QColor, QImage, QWheelEvent
+from PySide6.QtGui import QColor, QFontMetrics, QImage, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from gui.look.theme import Theme
 from gui.plots.axis import RoundAxis, guarded
+from gui.plots.panel_item import LEFT
 from gui.plots.small_plot import SmallPlot
 from tactile_lab.measurement import BETWEEN_SAMPLES
 from tactile_lab.plot import Guide, Mark, Panel, Plot, Series
@@ -111,6 +112,43 @@ def test_one_value_but_for_rounding_has_an_axis_that_can_be_read(app) -> None:
     view.show_plot(plot)
     left, right = view.panels[0].box.whole[0]
     assert 10 < right - left < 30 and left < 160 < right
+
+
+def near(*y: float) -> Plot:
+    """A time constant of each run, all nearly the same."""
+    series = Series(x=[1, 2], y=y, mark="joined", of=(7, 8))
+    panel = Panel(label="tau", unit="s", series=(series,))
+    return Plot(name="near", caption="", x_label="Run", whole=True, panels=(panel,))
+
+
+def test_numbers_that_differ_in_late_digits_are_told_as_in_the_report(app) -> None:
+    """They were one point on an axis from 4.1 to 4.65 s."""
+    view = SmallPlot(Theme("light"))
+    view.resize(340, 260)
+    view.show_plot(near(4.36877012, 4.36877031))
+    (one,) = view.panels
+    (heading,) = (i for i in one.items if isinstance(i, pg.LabelItem))
+    assert "tau less 4.36877 s (ns)" in heading.text
+    (left,) = (i for i in one.items if getattr(i, "orientation", "") == "left")
+    low, high = one.box.whole[1]
+    assert 80 < low < 120 and 310 < high < 350
+    step, values = left.tickValues(low, high, 150)[0]
+    texts = left.tickStrings(values, 1.0, step)
+    metrics = QFontMetrics(left.style["tickFont"])
+    assert max(map(metrics.horizontalAdvance, texts)) < LEFT
+    assert len(texts) > 2 and "200" in texts
+    assert one.at(QPointF(2, 310)) == 8, "its points are where they are drawn"
+
+
+def test_a_zoom_does_not_stay_where_other_numbers_are_on_the_axis(app) -> None:
+    view = SmallPlot(Theme("light"))
+    for y, kept in ((4.36877035, True), (4.5, False)):
+        view.show_plot(near(4.36877012, 4.36877031))
+        box = view.panels[0].box
+        box.setRange(yRange=(150, 200), padding=0)
+        view.show_plot(near(4.36877012, y))
+        shown = view.panels[0].box.viewRange()[1]
+        assert (shown == pytest.approx([150, 200])) is kept, shown
 
 
 def test_the_ends_of_intervals_are_in_view(app) -> None:
