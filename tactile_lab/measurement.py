@@ -26,7 +26,7 @@ from tactile_lab.lag import Lag
 from tactile_lab.magnetics import ForceUncertainty
 from tactile_lab.model.circuit import Circuit
 from tactile_lab.quantity import count
-from tactile_lab.signals import Source
+from tactile_lab.signals import DAGGER, Source
 from tactile_lab.waveform import Waveform
 
 if TYPE_CHECKING:
@@ -38,8 +38,6 @@ BETWEEN_SAMPLES = "spikes are missed: one fits between two samples of V_K"
 TOO_FAST = "spikes come faster than the circuit can fire; raise the threshold"
 """Why a trial has no latency, rate or fit: its spikes are not all counted, or are not
 the circuit's."""
-DAGGER = "†"
-"""Behind a number of spikes that are not all counted."""
 NOT_HELD = "no one force is held"
 """Why a trial has no adaptation: without a level its force changes all the time."""
 

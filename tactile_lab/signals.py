@@ -6,6 +6,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 Source = Literal["measured", "derived", "model"]
+DAGGER = "†"
+"""Behind a number of spikes that are not all counted."""
+NO_COUNT = f"{DAGGER}: seen, no count of the spikes there were."
+"""Below where it stands."""
 
 
 @dataclass(frozen=True)

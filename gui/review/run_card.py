@@ -157,12 +157,13 @@ class RunCard(QFrame):
 
 def told(entry: RunSummary) -> list[str]:
     """What a catalogue has of a run besides its name, one line each."""
+    no_count = " seen, no count" if entry.uncounted else ""
     values = {
         "scene": entry.scene,
         "bench": entry.bench,
         "sensor": entry.sensor,
         "operator": entry.operator,
-        "spikes": "" if entry.spikes is None else str(entry.spikes),
+        "spikes": "" if entry.spikes is None else f"{entry.spikes}{no_count}",
         "": entry.trouble,
     }
     found = [f"{name} {value}".strip() for name, value in values.items() if value]

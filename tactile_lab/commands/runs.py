@@ -133,12 +133,14 @@ def print_list(
 ) -> None:
     """One line a run, under headings."""
     from tactile_lab.quantity import count
+    from tactile_lab.signals import DAGGER, NO_COUNT
 
     rows = [("run", "status", "", "length", "spikes", "")]
     for i, entry in enumerate(entries):
         kind = {True: "sim", False: "real", None: "?"}[entry.simulated]
         length = "" if entry.duration is None else f"{entry.duration:.1f} s"
         spikes = "" if entry.spikes is None else count(entry.spikes, "spike")
+        spikes += DAGGER if entry.uncounted else ""
         empty = "" if entry.recorded else "none recorded"
         told = entry.trouble or entry.loss or empty
         if key is not None:
@@ -154,6 +156,8 @@ def print_list(
     for name, status, kind, length, spikes, told in rows:
         line = f"{name:<{wide}} {status:<10} {kind:<4} {length:>9} {spikes:>12}  {told}"
         say(line.rstrip())
+    if any(entry.uncounted for entry in entries):
+        say(NO_COUNT)
 
 
 def print_csv(facts: Sequence[Known]) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from tactile_lab.measurement import DAGGER, MeasuredTrial
+from tactile_lab.measurement import MeasuredTrial
 from tactile_lab.plot import Plot
 from tactile_lab.quantity import show
 from tactile_lab.report.drift import drift_sentence
@@ -23,6 +23,7 @@ from tactile_lab.report.table import (
     trials_table,
 )
 from tactile_lab.report.twin import sentences
+from tactile_lab.signals import DAGGER
 
 LONG = 12
 """Rows of a table one reads before anything else; a longer one follows the figures."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ from tactile_lab.analysis.control_chart import mean_and_error
 from tactile_lab.analysis.estimate import student_95
 from tactile_lab.conclusion import Table
 from tactile_lab.errors import ParameterError
-from tactile_lab.measurement import DAGGER
 from tactile_lab.plot import Panel, Plot, Series
 from tactile_lab.quantity import count, show, show_within
 from tactile_lab.report.canvas import draw, save
@@ -22,6 +21,7 @@ from tactile_lab.report.findings import find
 from tactile_lab.report.from_run import read
 from tactile_lab.report.html import picture, write_page_of_runs
 from tactile_lab.report.results import results
+from tactile_lab.signals import DAGGER, NO_COUNT
 from tactile_lab.store.catalogue import summary
 from tactile_lab.store.facts import Fact, grouped, of_results
 from tactile_lab.store.progress import Progress, each, nothing, share
@@ -44,19 +44,17 @@ class OneOfSeveral:
         entry: what it says of itself.
         rates: force of each trial, N, and its highest rate, Hz; NaN below two spikes.
         numbers: that were concluded or measured, by key.
-        uncounted: whether spikes of a trial were seen, and are no count.
     """
 
     entry: RunSummary
     rates: tuple[tuple[float, float], ...]
     numbers: dict[str, list[Fact]]
-    uncounted: bool = False
 
     @property
     def spikes(self) -> str:
         """How many were found; empty where they were not looked for."""
-        found = self.entry.spikes
-        return "" if found is None else f"{found}{DAGGER if self.uncounted else ''}"
+        found, mark = self.entry.spikes, DAGGER if self.entry.uncounted else ""
+        return "" if found is None else f"{found}{mark}"
 
     @property
     def specimen(self) -> str:
@@ -152,8 +150,8 @@ class SeveralRuns:
         note = (
             "Of a number that a run has several times, such as at each force, the mean."
         )
-        if any(run.uncounted for run in self.runs):
-            note += f" {DAGGER}: seen, no count of the spikes there were."
+        if any(run.entry.uncounted for run in self.runs):
+            note += f" {NO_COUNT}"
         return Table(
             title="Runs",
             headings=("Run", "Sensor", "Spikes", *keys),
@@ -290,8 +288,10 @@ def _read(folder: Path, progress: Progress) -> OneOfSeveral:
         if trial["level_N"] is not None
         for rate in (trial["peak_rate_Hz"],)
     )
+    # runs of older versions do not say so themselves
     uncounted = any(trial["uncounted"] for trial in told["trials"])
-    return OneOfSeveral(summary(folder), rates, grouped(of_results(told)), uncounted)
+    entry = replace(summary(folder), uncounted=uncounted)
+    return OneOfSeveral(entry, rates, grouped(of_results(told)))
 
 
 def _against_force(

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 from tactile_lab.analysis.estimate import Estimate, standard_error
 from tactile_lab.conclusion import Table
-from tactile_lab.measurement import DAGGER, MeasuredTrial, Measurement
+from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.quantity import plus_minus, printed, show
+from tactile_lab.signals import NO_COUNT
 
 NONE = "–"
 
@@ -44,7 +45,7 @@ def trials_table(run: Measurement) -> Table:
     if run.force_uncertainty is not None:
         note += " Force: ± its 95 % uncertainty by calibration and geometry."
     if any(trial.uncounted for trial in run.results):
-        note += f" {DAGGER}: seen, no count of the spikes there were."
+        note += f" {NO_COUNT}"
     named = any(trial.name != _force(trial) for trial in run.results)
     headings = (
         *("Trial",) * named,

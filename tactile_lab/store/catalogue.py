@@ -12,7 +12,12 @@ from typing import Any, Self
 
 from tactile_lab.errors import RunFolderError
 from tactile_lab.store.facts import Fact, facts, grouped
-from tactile_lab.store.folder import has_lost_data, read_info, told_status
+from tactile_lab.store.folder import (
+    UNCOUNTED,
+    has_lost_data,
+    read_info,
+    told_status,
+)
 from tactile_lab.store.index import Index
 from tactile_lab.store.remarks import read_remarks
 from tactile_lab.store.summary import RunSummary
@@ -24,7 +29,7 @@ KINDS: Mapping[str, type | tuple[type, ...]] = {
     **dict.fromkeys(("started", "title", "protocol", "scene", "bench"), str),
     **dict.fromkeys(("notes", "parameters", "loss"), dict),
     **dict.fromkeys(("duration_s", "spikes_online"), (int, float)),
-    "simulated": bool,
+    **dict.fromkeys(("simulated", UNCOUNTED), bool),
 }
 """What entries of `run.json` are, where they are there."""
 
@@ -142,6 +147,7 @@ def summary(path: Path) -> RunSummary:
         simulated=info.get("simulated"),
         duration=info.get("duration_s"),
         spikes=info.get("spikes_online"),
+        uncounted=bool(info.get(UNCOUNTED)),
         loss=str((info.get("loss") or {}).get("text") or ""),
     )
 

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from tactile_lab.arrays import FloatArray
 from tactile_lab.quantity import count, show
-from tactile_lab.store.folder import digest, write_info
+from tactile_lab.store.folder import UNCOUNTED, digest, write_info
 from tactile_lab.store.run import Run
+from tactile_lab.store.uncounted import uncounted
 
 PIECE = 1 << 22
 """Samples read at a time."""
@@ -176,13 +177,16 @@ def _seen_from(info: Mapping[str, Any]) -> float | None:
 def write_certificate(path: Path) -> Certificate:
     """Certify the run in folder `path` and note the result in its `run.json`.
 
+    Whether its spikes are no count is noted with it: lists of runs say so.
+
     Raises:
         RunFolderError: not a run that can be read.
         RecordingError: the folder cannot be written.
     """
     with Run.load(path) as run:
         certificate = certify(run)
-        info = {**run.info, "loss": certificate.to_json(), **constants(run)}
+        told = {"loss": certificate.to_json(), UNCOUNTED: any(uncounted(run))}
+        info = {**run.info, **told, **constants(run)}
     write_info(path, info)
     return certificate
 

@@ -33,6 +33,9 @@ ZERO = "time_zero"
 PLANNED = "instruments_planned"
 """Key of `run.json`: what the run is to open; runs of older versions lack it."""
 
+UNCOUNTED = "spikes_uncounted"
+"""Key of `run.json`: whether spikes of a trial are no count; older runs lack it."""
+
 DATA, LOG, SCENE, REPORT = "data.h5", "log.jsonl", "scene.toml", "report.html"
 
 LEDGER = "ledger.bin"

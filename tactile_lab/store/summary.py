@@ -31,6 +31,8 @@ class RunSummary:
         simulated: whether physics was computed.
         duration: of the experiment, s; None if not known.
         spikes: found on line; None if not known.
+        uncounted: whether those of a trial were seen, and are no count; False for runs
+            of older versions.
         loss: the certificate's line; empty if there is none.
         trouble: why the run cannot be read; empty where it can.
     """
@@ -52,6 +54,7 @@ class RunSummary:
     simulated: bool | None = None
     duration: float | None = None
     spikes: int | None = None
+    uncounted: bool = False
     loss: str = ""
     trouble: str = ""
 

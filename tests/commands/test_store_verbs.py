@@ -9,6 +9,8 @@ from click.testing import CliRunner
 from growing_run import begins_a_trial
 
 from tactile_lab.cli import cli
+from tactile_lab.engine.execution import Execution
+from tactile_lab.scene.load import load
 from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.layout import Layout
@@ -55,6 +57,20 @@ def test_runs_lists_and_filters(run):
     none = tell("runs", run.parent, "--search", "hold")
     assert none.exit_code == 0
     assert run.name not in none.output
+
+
+def test_spikes_that_are_no_count_are_marked_in_the_list(tmp_path):
+    """Those of a run stood there like a count, though V_K missed half of them."""
+    asked = {"protocol.levels": (0.2,), "protocol.hold": 1.5, "protocol.rest": 0.3}
+    for rate in (1e5, 1e6):
+        scene = load("demo", {**asked, "record.sample_rate": rate})
+        assert Execution(scene, tmp_path).run().exit_code == 0
+    slow, fast = json.loads(tell("runs", tmp_path, "--json").stdout)["runs"]
+    assert (slow["uncounted"], fast["uncounted"]) == (True, False)
+    listed = tell("runs", tmp_path).stdout.splitlines()
+    assert f" {slow['spikes']} spikes†  " in listed[1]
+    assert f" {fast['spikes']} spikes  " in listed[2]
+    assert listed[3:] == ["†: seen, no count of the spikes there were."]
 
 
 def test_show_tells_what_a_run_holds(run):

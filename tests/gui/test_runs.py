@@ -237,6 +237,14 @@ def test_pages_go_from_run_to_run(runs: RunsView, qtbot) -> None:
             assert seen == runs.cards[at].rect()
 
 
+def test_spikes_that_are_no_count_are_not_told_as_one(runs: RunsView) -> None:
+    runs.show_entries([replace(ENTRIES[1], uncounted=True), ENTRIES[2]])
+    tips = [card.toolTip() for card in runs.cards]
+    assert ["spikes 7 seen, no count" in tip for tip in tips] == [False, True]
+    runs.show_entries(ENTRIES)
+    assert not any("no count" in card.toolTip() for card in runs.cards)
+
+
 def test_a_run_killed_before_its_first_sample_says_that_nothing_was_recorded(
     runs: RunsView, tmp_path: Path
 ) -> None:

@@ -52,7 +52,7 @@ def test_what_is_mixed_or_missing_is_said() -> None:
 
 def test_spikes_that_are_no_count_are_marked() -> None:
     """17 of 60 stood there like a count, of V_K at 100 kS/s."""
-    entry = RunSummary(folder=Path("a"), name="a", spikes=17)
-    table = SeveralRuns((OneOfSeveral(entry, (), {}, uncounted=True), RUNS.runs[1]))
+    entry = RunSummary(folder=Path("a"), name="a", spikes=17, uncounted=True)
+    table = SeveralRuns((OneOfSeveral(entry, (), {}), RUNS.runs[1]))
     assert table.table.rows[0][2] == "17†" and "no count" in table.table.note
     assert "no count" not in RUNS.table.note
