@@ -407,6 +407,19 @@ def test_what_is_told_of_a_long_run_by_stretches_is_not_less(
     assert takes <= told < 1.5 * takes
 
 
+@pytest.mark.parametrize(
+    "part", [{}, {"signals": ("V_K",)}, {"signals": ("V_C1", "force")}, {"rate": 10e3}]
+)
+@pytest.mark.parametrize("probes", [packed.PROBES, 2])
+def test_what_csv_will_take_is_told_as_it_is(run, tmp_path, part, probes, monkeypatch):
+    """Of V_K, whose text is short where it rests, 1.57 times as much was told."""
+    monkeypatch.setattr(packed, "PROBES", probes)
+    monkeypatch.setattr(packed, "PROBED", run.samples // 3)
+    signals, *_ = to_csv.export(run, tmp_path, Selection(**part))
+    takes, told = signals.stat().st_size, to_csv.size(run, Selection(**part))
+    assert takes <= told < 1.3 * takes
+
+
 def told_and_taken(run, out, form, selection):
     """Bytes told beforehand, and those of what was written."""
     for library in ("h5netcdf", "pynwb", "pyarrow"):

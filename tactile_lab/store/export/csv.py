@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tactile_lab.arrays import FloatArray
+from tactile_lab.store.export import packed
 from tactile_lab.store.export.content import (
     TABLES,
     ExportTable,
@@ -27,23 +28,21 @@ ToText = Callable[[FloatArray], Text]
 
 AT_ONCE = 1 << 15
 """Rows turned into text at once, on every core: more do not fit its cache."""
-WIDTH = 19
-"""Bytes of a number in twelve digits with its comma, at most."""
-DECIMALS = 11
-"""Bytes of point, nine decimals and comma."""
 
 
 def size(run: Run, selection: Selection) -> int:
-    """Bytes the file of signals will take, at most."""
-    names, rows = selection.names(run), selection.rows(run)
-    widths = [len(str(int(run.duration))) + DECIMALS]
-    for name in names:
-        text = _text(run, name, selection)
-        if isinstance(text, CodeText):
-            widths.append(text.width + 1)
-        else:  # a force has a sign and one digit before its point
-            widths.append(2 + DECIMALS if name == "force" else WIDTH)
-    return rows * sum(widths)
+    """Bytes the file of signals will take, rather fewer, as stretches of it tell."""
+    names = selection.names(run)
+    texts = [_text(run, name, selection) for name in names]
+
+    def pack(part: Selection) -> int:
+        return sum(
+            len(_told(texts, time, columns, first))
+            for time, columns in part.pieces(run)
+            for first in range(0, time.size, AT_ONCE)
+        )
+
+    return len(_head(names)) + packed.signals(run, selection, pack)
 
 
 def export(
@@ -91,8 +90,7 @@ def _signals(
         part.open("wb") as file,
         ThreadPoolExecutor() as threads,
     ):
-        heads = ["time_s", *(f"{name}_{unit(name)}" for name in names)]
-        file.write((",".join(heads) + "\n").encode())
+        file.write(_head(names))
         for time, columns in selection.pieces(run):
             told = partial(_told, texts, time, columns)
             for text in threads.map(told, range(0, time.size, AT_ONCE)):
@@ -100,6 +98,11 @@ def _signals(
             done += time.size
             progress(done / rows)
     return path
+
+
+def _head(names: Sequence[str]) -> bytes:
+    heads = ["time_s", *(f"{name}_{unit(name)}" for name in names)]
+    return (",".join(heads) + "\n").encode()
 
 
 def _told(

@@ -34,11 +34,6 @@ class CodeText:
         codes = np.arange(limits.min, limits.max + 1, dtype=np.float64)
         self._texts = written(codes * self._gain + self._offset)
 
-    @property
-    def width(self) -> int:
-        """Characters of the longest."""
-        return int(self._texts.shape[1])
-
     def __call__(self, values: FloatArray) -> Text:
         """Text of SI values that are codes times gain plus offset."""
         codes = np.rint((values - self._offset) / self._gain).astype(np.int64)
