@@ -312,7 +312,8 @@ signal.signal(signal.{name}, signal.SIG_DFL)  # nohup has SIGHUP ignored, and is
 def pieces(self, run):
     for piece in whole(self, run):
         try:
-            os.kill(os.getpid(), signal.{name})
+            if os.path.isdir(sys.argv[-1]):  # once its size is reckoned
+                os.kill(os.getpid(), signal.{name})
         except BaseException:
             if not {swallowed}:  # as a callback from C does
                 raise
