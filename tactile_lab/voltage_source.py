@@ -11,6 +11,9 @@ from tactile_lab.table import SceneTable
 SOURCED = ("V_GS", "V_S", "V_th")
 """Voltages of the circuit that a source meter may hold."""
 
+SETTLED = 10.0
+"""Time constants of the integrator after which a changed voltage has settled."""
+
 Volts = Annotated[float, Unit("V")]
 
 

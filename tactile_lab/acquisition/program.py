@@ -15,9 +15,6 @@ from tactile_lab.drive import Drive
 from tactile_lab.scope import Channel
 from tactile_lab.trial import Trial, Trials
 
-SETTLED = 10.0
-"""Time constants of the integrator after which a changed voltage has settled."""
-
 
 @dataclass(frozen=True)
 class Program:

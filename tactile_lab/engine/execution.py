@@ -23,7 +23,7 @@ from tactile_lab.acquisition.drift import Drift
 from tactile_lab.acquisition.drive_check import DriveCheck
 from tactile_lab.acquisition.ending import CoilState, Ending, Executed
 from tactile_lab.acquisition.person import Ask
-from tactile_lab.acquisition.program import SETTLED, Program
+from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
 from tactile_lab.bench import Bench, OffReport
@@ -46,6 +46,7 @@ from tactile_lab.store.folder import RunFolder, Status
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.store.remarks import add_note
 from tactile_lab.trial import Trial
+from tactile_lab.voltage_source import SETTLED
 
 STATUS: dict[events.RunState, Status] = {
     events.RunState.COMPLETE: "complete",

@@ -18,7 +18,7 @@ import numpy as np
 from tactile_lab.acquisition import events
 from tactile_lab.acquisition.ending import Ending
 from tactile_lab.acquisition.instruments import NO_COIL
-from tactile_lab.acquisition.program import SETTLED, Program
+from tactile_lab.acquisition.program import Program
 from tactile_lab.acquisition.ring import Ring, RingContents
 from tactile_lab.acquisition.runner import Runner
 from tactile_lab.acquisition.search import SpikeSearch
@@ -40,6 +40,7 @@ from tactile_lab.store.certificate import write_certificate
 from tactile_lab.store.folder import RunFolder
 from tactile_lab.store.recorder import Recorder
 from tactile_lab.trial import Outcome, Trial, Trials
+from tactile_lab.voltage_source import SETTLED
 from tactile_lab.waveform import Waveform
 
 MOST = 1_000_000_000

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.acquisition.program import SETTLED
 from tactile_lab.arrays import FloatArray
 from tactile_lab.current_list import CurrentList
 from tactile_lab.drive import Drive
@@ -21,6 +20,7 @@ from tactile_lab.planning.way import drive_for
 from tactile_lab.quantity import show
 from tactile_lab.scene.scene import Scene
 from tactile_lab.trial import BASELINE, Outcome, Probes, Trial, Trials, playable
+from tactile_lab.voltage_source import SETTLED
 from tactile_lab.waveform import Waveform
 
 MOST_TRIALS = 10_000
