@@ -46,10 +46,11 @@ class Estimate:
         """Half the width of the 95 % interval."""
         return (self.high - self.low) / 2
 
-    def text(self, unit: str, factor: float = 1.0) -> str:
+    def text(self, unit: str, factor: float = 1.0, level: str = ", 95 %") -> str:
         """For a person: "3.10 s (2.90 to 3.30 s, 95 %)"; `factor`: from SI to `unit`.
 
         All three end at one digit: the third, or the one that tells the ends apart.
+        `level` is empty where what stands beside it says how sure an interval is.
         """
         half = self.half * abs(factor)
         first = _power(max(abs(self.value * factor), half))
@@ -60,8 +61,8 @@ class Estimate:
         )
         behind = f" {unit}".rstrip()
         if self.value == self.low < self.high:
-            return f"{low}{behind} (at its bound; below {high}{behind}, 95 %)"
-        return f"{value}{behind} ({low} to {high}{behind}, 95 %)"
+            return f"{low}{behind} (at its bound; below {high}{behind}{level})"
+        return f"{value}{behind} ({low} to {high}{behind}{level})"
 
     def shown(self, unit: str) -> str:
         """The same with the prefix before the SI `unit` that suits it: in pA, not A."""

@@ -37,8 +37,8 @@ def told(run: Run) -> tuple[str, ...]:
     ratio = None if shunt is None else shunt_over_source(applied, shunt)
     if ratio is not None:
         said += (
-            f"; averaged over each level the shunt reads {ratio.value:.4g} "
-            f"({ratio.low:.4g} to {ratio.high:.4g}) of the source"
+            f"; averaged over each level the shunt reads {ratio.text('', level='')} "
+            "of the source"
         )
     return (said,)
 

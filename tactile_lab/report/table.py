@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from tactile_lab.analysis.estimate import Estimate, standard_error
 from tactile_lab.conclusion import Table
 from tactile_lab.measurement import MeasuredTrial, Measurement
-from tactile_lab.quantity import plus_minus, printed, show
+from tactile_lab.quantity import plus_minus, show
 from tactile_lab.signals import NO_COUNT
 
 NONE = "–"
@@ -96,7 +96,7 @@ def fits_table(run: Measurement) -> Table:
             continue
         cells = [trial.name]
         for estimate, unit in ((fit.alpha, "Hz"), (fit.beta, "1/s"), (fit.gamma, "Hz")):
-            cells.append(_ranged(estimate, unit) + "*" * fit.systematic)
+            cells.append(estimate.text(unit, level="") + "*" * fit.systematic)
         cells += [f"{fit.irregularity:.3f}", f"{fit.r_squared:.4f}", str(fit.intervals)]
         rows.append(tuple(cells))
     return Table(
@@ -121,7 +121,7 @@ def circuit_fits_table(run: Measurement) -> Table:
         rows.append(
             (
                 trial.name,
-                _ranged(fit.tau, "s"),
+                fit.tau.text("s", level=""),
                 plus_minus(fit.V_GS.value, fit.V_GS.half, "V"),
                 plus_minus(fit.V_P.value, fit.V_P.half, "V"),
                 show(fit.rms, "Hz", 2),
@@ -186,21 +186,13 @@ def _time_constants(run: Measurement) -> Iterator[str]:
     for trial in run.results:
         fit = trial.adaptation
         if fit is not None:
-            tau, said = fit.time_constant, ""
-            yield f"{tau.value:.3g} s ({tau.low:.3g} to {tau.high:.3g} s)"
+            said = ""
+            yield fit.time_constant.text("s", level="")
         elif trial.response.spikes == 0 and not trial.uncounted:
             yield NONE
         else:
             yield "as above" if trial.why_not == said else trial.why_not
             said = trial.why_not
-
-
-def _ranged(estimate: Estimate, unit: str) -> str:
-    """A fitted value with its interval in brackets, or that it lies at its bound."""
-    spread = f"{_true(estimate.low)} to {_true(estimate.high)}"
-    if estimate.value == estimate.low < estimate.high:
-        spread = f"at its bound, below {_true(estimate.high)}"
-    return f"{_true(estimate.value)} {unit} ({spread})"
 
 
 def _with(
@@ -214,7 +206,3 @@ def _with(
 
 def _shown(value: float | None, unit: str, digits: int = 3) -> str:
     return NONE if value is None else show(value, unit, digits)
-
-
-def _true(value: float) -> str:
-    return printed(f"{value:.4g}")

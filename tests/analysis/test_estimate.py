@@ -27,6 +27,14 @@ def test_a_value_and_the_ends_of_its_interval_end_at_one_digit(value, half, text
     assert Estimate(value, half / 2, value - half, value + half).text("s") == text
 
 
+def test_its_level_can_be_said_once_beside_many():
+    """A cell said "8.68 s (8.66 to 8.7)"."""
+    told = Estimate(8.68, 0.01, 8.66, 8.70)
+    assert told.text("s", level="") == "8.68 s (8.66 to 8.70 s)"
+    bound = Estimate(0.02, 0.01, 0.02, 0.31)
+    assert bound.text("Hz", level="") == "0.020 Hz (at its bound; below 0.310 Hz)"
+
+
 @pytest.mark.parametrize(
     ("value", "half", "unit", "text"),
     [

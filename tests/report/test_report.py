@@ -212,7 +212,8 @@ def test_a_long_hold_gives_a_time_constant(run_maker):
     fit = findings.run.results[0].adaptation
     assert fit is not None
     assert 1 < fit.time_constant.value < 5
-    assert re.match(r"[\d.]+ s \([\d.]+ to", trials_table(findings.run).rows[0][-1])
+    told = trials_table(findings.run).rows[0][-1]
+    assert told == fit.time_constant.text("s").replace(", 95 %", "")
 
 
 def test_no_adaptation_is_told_of_a_force_that_is_not_held(run_maker):
