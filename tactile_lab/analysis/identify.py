@@ -17,6 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.evidence import (
+    LEAST,
     SCALES,
     VOLTAGES,
     JointResiduals,
@@ -47,6 +48,8 @@ ROUNDS = 3
 """So often slopes are taken anew, and with each the scatter."""
 NOISY = 1e-3
 """Part of V_fire by which V_C2 has to scatter as it fires for noise to be told."""
+LEFT = 1e-3
+"""Least part of a bin of V_C1 that a fit is thought to leave."""
 ALIKE_SLOPES = 1e-7
 """Slopes that differ by less, as a part of them, are one."""
 
@@ -214,10 +217,10 @@ def _identified(
     unit = jacobian / lengths
     strength, direction = np.linalg.eigh(unit.T @ unit)
     inverse = direction / np.maximum(strength, 1e-14) @ direction.T
-    covariance = inverse / np.outer(lengths, lengths)
     gain = inverse @ unit.T / lengths[:, np.newaxis]
-    held = float(np.sum(np.linalg.qr(slope)[0][: problem.size][~problem.traced] ** 2))
-    covariance += _shared(problem, x, gain, weights, held)
+    held = np.sum(np.linalg.qr(slope)[0] ** 2, axis=1)
+    covariance = inverse / np.outer(lengths, lengths)
+    covariance += _unlike(problem, x, gain, weights, held)
     covariance *= problem.size / freedom
     errors = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(errors, errors)
@@ -238,29 +241,37 @@ def _identified(
     )
 
 
-def _shared(
+def _unlike(
     problem: JointResiduals,
     x: FloatArray,
     gain: FloatArray,
     weights: FloatArray,
-    held: float,
+    held: FloatArray,
 ) -> FloatArray:
-    """Covariance of what is fitted, less that of independent intervals; shape (n, n).
+    """Covariance of what is fitted, less that of independent, like data; shape (n, n).
+
+    Bins of V_C1 scatter more where it moves or a code ends, and tell more there: each
+    counts by its own square, as by White (1980). Intervals err alike with their
+    neighbours.
 
     Args:
         problem: of which.
         x: where the fit ended.
         gain: what each weighed residual moves a parameter by, shape (n, all).
-        weights: of the residuals.
-        held: so many of the intervals the fit has taken up.
+        weights: of the residuals, shape (all,).
+        held: the part of each that the fit has taken up, shape (all,).
     """
-    intervals = problem.intervals(x, problem.residual(x), held)
-    if intervals is None:
-        return np.zeros((len(gain), len(gain)))
-    paired = np.flatnonzero(~problem.traced)
-    alone = gain[:, paired]
-    shared = intervals.covariance(alone * weights[paired])
-    return np.asarray(shared - alone @ alone.T, dtype=np.float64)
+    residual = problem.residual(x)
+    traced, paired = np.flatnonzero(problem.traced), np.flatnonzero(~problem.traced)
+    bins, alone = gain[:, traced], gain[:, paired]
+    changed = -alone @ alone.T
+    if traced.size:
+        square = residual[traced] ** 2 / np.maximum(1 - held[traced], LEFT) + LEAST**2
+        changed += bins * (square / np.mean(square) - 1) @ bins.T
+    intervals = problem.intervals(x, residual, float(np.sum(held[paired])))
+    if intervals is not None:
+        changed += intervals.covariance(alone * weights[paired])
+    return np.asarray(changed, dtype=np.float64)
 
 
 def _nearby(problem: JointResiduals) -> FloatArray:
