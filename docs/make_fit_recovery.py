@@ -124,10 +124,12 @@ def identified(truth: Truth, wobble: float | None) -> Fit:
     return fit
 
 
-def transfer(leakage: float, ammeter: float = 0.0) -> Fit:
+def transfer(
+    leakage: float, ammeter: float, between: tuple[float, float] | None
+) -> Fit:
     """Fit Table 1's transfer curve with 5 % noise, beside a leakage, A.
 
-    `ammeter` scatters by so much, A, whatever the current.
+    `ammeter` scatters by so much, A, whatever the current; `between` is as asked for.
     """
 
     def fit(seed: int) -> dict[str, Estimate]:
@@ -136,7 +138,7 @@ def transfer(leakage: float, ammeter: float = 0.0) -> Fit:
         rng = np.random.default_rng(seed)
         noise = rng.normal(0, 0.05, volts.size)
         beside = rng.normal(0, ammeter, volts.size)
-        found = fit_transfer(volts, line * np.exp(noise) + beside)
+        found = fit_transfer(volts, line * np.exp(noise) + beside, between=between)
         return {"I_S": found.I_S, "m": found.m}
 
     return fit
@@ -196,13 +198,14 @@ def cases() -> list[tuple[str, Truth, Fit]]:
     found.append(
         ("circuit, V_C1 and spikes, V_fire ±20 mV", three, identified(three, 0.02))
     )
-    for leakage, ammeter, beside in (
-        (0.0, 0.0, ""),
-        (1e-11, 0.0, ", 10 pA leak"),
-        (-1e-11, 1e-11, ", an ammeter 10 pA off with 10 pA of noise"),
+    for leakage, ammeter, between, how in (
+        (0.0, 0.0, None, ""),
+        (1e-11, 0.0, None, ", 10 pA leak"),
+        (-1e-11, 1e-11, None, ", an ammeter 10 pA off with 10 pA of noise"),
+        (0.0, 1e-11, (0.5, 2.0), " between 0.5 V and 2 V, 10 pA of noise"),
     ):
-        truth = {"I_S": 1.216e-12, "m": 5.646}
-        found.append((f"transfer curve{beside}", truth, transfer(leakage, ammeter)))
+        truth, fit = {"I_S": 1.216e-12, "m": 5.646}, transfer(leakage, ammeter, between)
+        found.append((f"transfer curve{how}", truth, fit))
     found.append(("I_DS decay", {"tau": 8.69}, decay))
     return found
 

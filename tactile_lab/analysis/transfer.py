@@ -24,8 +24,6 @@ PAIRS = 100
 """Ratios of an ammeter's noise to what grows with the current that are tried."""
 LARGEST = 300.0
 """Of the logarithm of a current that is tried."""
-SURE = 3.84
-"""Twice the logarithm of how much likelier noise must make what is left: 95 %."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +76,7 @@ def fit_transfer(
         I_DS: drain current, A.
         V_T: thermal voltage, V.
         between: V_GS to fit, V, its ends in either order, and by a line without
-            leakage through ln I_DS, where that is over 0 A; by default up to 2.75 V.
+            leakage; by default up to 2.75 V.
 
     Raises:
         ParameterError: unequal shapes or values that are not finite.
@@ -107,14 +105,17 @@ def fit_transfer(
     if x.size < FEWEST:
         raise NotIdentifiableError(_too_few(int(x.size), volts, between))
     line = Line.through(x, y) if np.ptp(x) > 0 else None
-    beside: _Beside | None = None
-    if line is not None and line.slope.value > 0 and between is None:
-        below = volts <= SUBTHRESHOLD_END
-        x = volts[below]
-        beside = _beside_leakage(x, amperes[below], line)
-        line = beside.line
-        over = ABOVE_FLOOR * max(abs(beside.leakage), beside.noise)
-        x = x[line.offset.value + line.slope.value * x >= math.log(over or math.ulp(0))]
+    leakage = None
+    if line is not None and line.slope.value > 0:
+        low, high = (-math.inf, SUBTHRESHOLD_END) if between is None else between
+        inside = (volts >= low) & (volts <= high)
+        x = volts[inside]
+        found = _weighed(x, amperes[inside], line, leaks=between is None)
+        line = found.line
+        if between is None:
+            leakage = found.leakage
+            over = ABOVE_FLOOR * max(abs(leakage), found.noise) or math.ulp(0)
+            x = x[line.offset.value + line.slope.value * x >= math.log(over)]
         if x.size < FEWEST:
             raise NotIdentifiableError(_too_few(int(x.size), volts, between))
     if line is None or line.slope.value <= 0:
@@ -130,7 +131,7 @@ def fit_transfer(
         ),
         m=_reciprocal(steep, 1 / V_T),
         swing=_reciprocal(steep, math.log(10)),
-        leakage=None if beside is None else beside.leakage,
+        leakage=leakage,
         V_T=V_T,
         points=int(x.size),
         range=(float(x.min()), float(x.max())),
@@ -139,12 +140,12 @@ def fit_transfer(
 
 
 @dataclass(frozen=True, eq=False)
-class _Beside:
+class _Weighed:
     """A line and a constant current, of which a curve consists.
 
     Attributes:
         line: ln I_DS of the line alone; its scatter is what grows with the current.
-        leakage: the constant current, A, either sign.
+        leakage: the constant current, A, either sign; 0 where none was sought.
         noise: standard deviation of what scatters alike at all currents, A.
     """
 
@@ -153,8 +154,10 @@ class _Beside:
     noise: float
 
 
-def _beside_leakage(x: FloatArray, amperes: FloatArray, line: Line) -> _Beside:
-    """The line, and the constant current, of which the current at x (V) consists.
+def _weighed(
+    x: FloatArray, amperes: FloatArray, line: Line, *, leaks: bool
+) -> _Weighed:
+    """Of what the current at x (V) consists: a line, and a constant one if it `leaks`.
 
     A part of the current scatters, and so does the ammeter, whatever the current: what
     each point tells is weighed by both, which its own points tell. So points are taken
@@ -172,23 +175,23 @@ def _beside_leakage(x: FloatArray, amperes: FloatArray, line: Line) -> _Beside:
     p = np.array([line.offset.value + line.slope.value * middle, line.slope.value])
     lowest = np.argsort(x)[: max(FEWEST // 2, x.size // 4)]
     over = (amperes - of(p))[lowest]
-    leakage = float(np.median(over))
+    leakage = float(np.median(over)) if leaks else 0.0
     scatter, noise = max(line.scatter, LEAST), float(np.abs(over).max())
     if not noise > LEAST * float(np.abs(amperes).max()) and line.scatter < LEAST:
-        return _Beside(line, 0.0, 0.0)
+        return _Weighed(line, 0.0, 0.0)
 
     def left(p: FloatArray, unit: float, spread: FloatArray) -> FloatArray:
-        return np.asarray((of(p) + p[2] * unit - amperes) / spread)
+        return np.asarray((of(p) + p[2:].sum() * unit - amperes) / spread)
 
-    p = np.append(p, 0.0)
+    p = np.append(p, [0.0] * leaks)
     for _ in range(ROUNDS):
         unit = noise or float(np.abs(amperes).min())
         spread = np.hypot(scatter * (of(p) + abs(leakage)), noise)
-        p[2] = leakage / unit
+        p[2:] = leakage / unit
         found = least_squares(left, p, x_scale="jac", method="lm", args=(unit, spread))
         moved = np.abs(found.x - p)
         p = np.asarray(found.x, dtype=np.float64)
-        leakage = float(p[2]) * unit
+        leakage = float(p[2:].sum()) * unit
         alone = of(p)
         before = scatter, noise
         scatter, noise = _scatters(alone + leakage - amperes, alone + abs(leakage))
@@ -198,29 +201,24 @@ def _beside_leakage(x: FloatArray, amperes: FloatArray, line: Line) -> _Beside:
     slopes = np.asarray(found.jac, dtype=np.float64)
     size = x.size / freedom  # what the fit took of the scatter
     covariance = np.linalg.pinv(slopes.T @ slopes) * size
-    at_zero = np.array([1.0, -middle, 0.0])
+    at_zero = np.array([1.0, -middle, 0.0])[: p.size]
     errors = np.sqrt([covariance[1, 1], at_zero @ covariance @ at_zero])
     steep, offset = (
         Estimate.of(float(value), float(error), freedom)
         for value, error in zip((p[1], p[0] - p[1] * middle), errors, strict=True)
     )
     root = math.sqrt(size)
-    return _Beside(Line(steep, offset, scatter * root), leakage, noise * root)
+    return _Weighed(Line(steep, offset, scatter * root), leakage, noise * root)
 
 
 def _scatters(left: FloatArray, current: FloatArray) -> tuple[float, float]:
-    """Which part of `current` scatters, and how many amperes: the likeliest pair.
-
-    No amperes where they make what is left, A, little likelier than none.
-    """
+    """The part of `current` and the amperes that most likely scatter, making `left`."""
     apart = np.geomspace(0.1 * current.min(), 10 * current.max(), PAIRS)
     apart = np.append(0.0, apart)  # amperes over part
     shape = current**2 + apart[:, np.newaxis] ** 2
     part = np.maximum(np.mean(left**2 / shape, axis=1), LEAST**2)
     unlikely = left.size * np.log(part) + np.log(shape).sum(axis=1)
     best = int(unlikely.argmin())
-    if unlikely[0] - unlikely[best] < SURE:
-        best = 0
     found = math.sqrt(part[best])
     return found, found * float(apart[best])
 

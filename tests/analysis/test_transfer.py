@@ -57,15 +57,27 @@ def test_its_intervals_cover_the_truth_beside_what_leaks(floor, noise):
 
 
 @pytest.mark.parametrize(
-    ("floor", "ammeter"), [(0.0, 1e-12), (0.0, 1e-11), (-1e-11, 1e-11), (1e-10, 1e-11)]
+    ("floor", "ammeter", "between"),
+    [
+        (0.0, 1e-12, None),
+        (0.0, 1e-11, None),
+        (-1e-11, 1e-11, None),
+        (1e-10, 1e-11, None),
+        (0.0, 1e-11, (0.5, 2.0)),
+    ],
 )
-def test_its_intervals_cover_the_truth_where_the_ammeter_scatters(floor, ammeter):
-    """Of 10 pA of noise, 10 pA off, I_S held in 32 of 100 and m in 48."""
+def test_its_intervals_cover_the_truth_where_the_ammeter_scatters(
+    floor, ammeter, between
+):
+    """Of 10 pA of noise, 10 pA off, I_S held in 32 of 100 and m in 48.
+
+    And where a range was asked for, by a line through ln I_DS, in 70 and 80.
+    """
     hits, repeats = np.zeros(2), 60
     for seed in range(repeats):
         noise = ammeter * np.random.default_rng([seed, 1]).standard_normal(V.size)
         read = curve(noise=0.02, floor=floor, seed=seed) + noise
-        found = fit_transfer(V, read)
+        found = fit_transfer(V, read, between=between)
         hits += [
             found.I_S.low <= 1.216e-12 <= found.I_S.high,
             found.m.low <= 5.646 <= found.m.high,
