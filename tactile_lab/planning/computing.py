@@ -42,12 +42,12 @@ PER_HELD_SECOND = 6.4e-3
 LANE, STORED, DETECTED = 0.07, 0.0065, 0.0065
 """Of a stored channel's file and lane; per million samples of one channel: rendered,
 compressed, read again and drawn; and of the one on which spikes are looked for, s."""
-COMPARED, COMPARED_TRIAL = 0.1, 0.045
+COMPARED, COMPARED_TRIAL = 0.17, 0.0125
 COMPARED_POINT, COMPARED_SPIKE = 1.2e-3, 1.0e-3
 """Of the model beside the run, which is solved once as it is believed and once for each
 cause of uncertainty: with its figure, per trial, per set-point or point of a list, and
 per spike that counts, s."""
-RESIDUAL, RESIDUAL_TRIAL = 0.05, 0.045
+RESIDUAL, RESIDUAL_TRIAL = 0.08, 0.0125
 """Of V_C1 less the model's, which is sampled for it, and per trial, s."""
 SEARCHED, SEARCHED_SPIKE = 1.4, 0.035
 """Of the search for what explains a misfit, and per spike, s. It can be foreseen only
