@@ -170,7 +170,9 @@ def standard_error(values: FloatArray) -> float:
     )
 
 
-def correlated(residual: FloatArray, group: FloatArray | None = None) -> float:
+def correlated(
+    residual: FloatArray, group: FloatArray | None = None, *, swings: bool = False
+) -> float:
     """How many neighbouring points err alike, at least 1.
 
     That is 1 + 2 times the sum of the residual's correlations, to the first that noise
@@ -180,20 +182,24 @@ def correlated(residual: FloatArray, group: FloatArray | None = None) -> float:
         residual: shape (n,), in order.
         group: shape (n, k), 1 in the column of a point's group: only points of one
             group are neighbours.
+        swings: what neighbours have in common swings back further on, such as what a
+            converter's steps leave: the farther ones count less, by the weights of
+            Newey and West (1987).
     """
     import numpy as np
 
-    power, together = float(np.sum(residual**2)), 1.0
+    power, alike = float(np.sum(residual**2)), list[float]()
     member = np.ones((residual.size, 1)) if group is None else group
     if power == 0:
-        return together
+        return 1.0
     for lag in range(1, residual.size // 4):
         same = np.sum(member[lag:] * member[:-lag], axis=1)
         correlation = float(np.sum(same * residual[lag:] * residual[:-lag])) / power
         if correlation < 2 / math.sqrt(residual.size):
             break
-        together += 2 * correlation
-    return together
+        alike.append(correlation)
+    weight = 1 - np.arange(1, len(alike) + 1) / (len(alike) + 1) * swings
+    return 1 + 2 * float(weight @ alike)
 
 
 @cache

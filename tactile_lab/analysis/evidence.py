@@ -272,10 +272,11 @@ class JointResiduals:
         none is then followed for having fitted best.
         """
         weights = np.ones(residual.size)
-        for kind in (self.traced, ~self.traced):
+        for kind, swings in ((self.traced, True), (~self.traced, False)):
             seen, of = residual[: self.size][kind], weights[: self.size]
             if seen.size:
-                of[kind] /= max(scatter(seen) * math.sqrt(correlated(seen)), LEAST)
+                alike = correlated(seen, swings=swings)
+                of[kind] /= max(scatter(seen) * math.sqrt(alike), LEAST)
         return weights
 
     def _factors(self, x: FloatArray) -> list[float]:

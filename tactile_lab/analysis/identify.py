@@ -17,7 +17,6 @@ from threadpoolctl import threadpool_limits
 
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.evidence import (
-    LEAST,
     SCALES,
     VOLTAGES,
     JointResiduals,
@@ -251,7 +250,8 @@ def _unlike(
     """Covariance of what is fitted, less that of independent, like data; shape (n, n).
 
     Bins of V_C1 scatter more where it moves or a code ends, and tell more there: each
-    counts by its own square, as by White (1980). Intervals err alike with their
+    counts by how far its own square lies from their mean, as by White (1980). What
+    neighbours have in common is in the weights. Intervals err alike with their
     neighbours.
 
     Args:
@@ -266,8 +266,9 @@ def _unlike(
     bins, alone = gain[:, traced], gain[:, paired]
     changed = -alone @ alone.T
     if traced.size:
-        square = residual[traced] ** 2 / np.maximum(1 - held[traced], LEFT) + LEAST**2
-        changed += bins * (square / np.mean(square) - 1) @ bins.T
+        square = residual[traced] ** 2 / np.maximum(1 - held[traced], LEFT)
+        moves = bins * weights[traced]
+        changed += moves * (square - np.mean(square)) @ moves.T
     intervals = problem.intervals(x, residual, float(np.sum(held[paired])))
     if intervals is not None:
         changed += intervals.covariance(alone * weights[paired])

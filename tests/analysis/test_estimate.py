@@ -2,9 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from tactile_lab.analysis.estimate import Estimate
+from tactile_lab.analysis.estimate import Estimate, correlated
 
 
 @pytest.mark.parametrize(
@@ -75,3 +76,13 @@ def test_a_share_has_wilson_s_interval(good, low, high):
     told = Estimate.share(good, 10)
     assert told.value == good / 10
     assert (told.low, told.high) == pytest.approx((low, high), abs=5e-5)
+
+
+def test_what_swings_back_is_counted_less_the_farther_it_is():
+    """What codes left of V_C1 had its first swing counted whole, and no other."""
+    rng = np.random.default_rng(0)
+    wave = np.sin(np.arange(2000) / 20) + rng.normal(0, 0.1, 2000)
+    alike, less = correlated(wave), correlated(wave, swings=True)
+    assert 0.6 * alike < less < 0.8 * alike
+    noise = rng.normal(0, 1, 2000)
+    assert correlated(noise) == correlated(noise, swings=True) == 1.0
