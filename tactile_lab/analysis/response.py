@@ -28,6 +28,9 @@ AROUND = 20
 """Bins of the spectrum on either side of a line that tell the noise below it."""
 MOST_BESSEL = 0.5819
 """The Bessel function J1 nowhere exceeds this."""
+HEIGHTS = 9
+"""Of an answer, within half a code of the one found, that are tried for what codes do
+to its phase: to one of them they may do nothing."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,9 @@ def gain(
         step_bias: how far means of the answer may be off by a converter's steps, in its
             unit (`tactile_lab.analysis.converter`). They move a sine's amplitude A by
             2 b J1(2 pi A/step) at most, about 2/pi b sqrt(step/A), b = step/pi where no
-            noise smooths them and the bias where some does, and its phase not at all.
+            noise smooths them and the bias where some does, and its phase not at all;
+            but that of an answer in stairs, whose way up has other levels than its way
+            down.
         code: one step of that converter, in the answer's unit; what is left of the
             steps repeats with it and is no scatter either.
         leak: time constant with which a transient dies away, s; fitted if given.
@@ -102,7 +107,7 @@ def gain(
     for _ in range(MOST_LINES + 1):
         design = np.column_stack([*waves, *drift, *lines])
         inverse = np.linalg.pinv(design)
-        left, beside = _left_over(design, inverse, given_by, answered, code)
+        left, seen, beside = _left_over(design, inverse, given_by, answered, code)
         found = _line(left, above=(HARMONICS + 1) * cycles)
         if not found:
             break
@@ -126,11 +131,12 @@ def gain(
     step = code or 2 * step_bias
     first = min(step_bias, step / math.pi)
     codes = 2 * first * min(MOST_BESSEL, math.sqrt(step / size) / math.pi)
+    aside = first * _aside(turned.imag, seen, step, size) if first else 0.0
     ratio = got / given
     return Gain(
         frequency,
         Estimate.of(abs(ratio), along / abs(given), free).widened(codes / abs(given)),
-        Estimate.of(float(np.angle(ratio)), across / size, free),
+        Estimate.of(float(np.angle(ratio)), across / size, free).widened(aside / size),
         abs(given),
     )
 
@@ -146,14 +152,33 @@ def _begun(time: FloatArray, cause: FloatArray, frequency: float) -> int:
     return int(not_yet[-1]) + 1 if not_yet.size else 0
 
 
+def _aside(across: FloatArray, seen: FloatArray, step: float, size: float) -> float:
+    """How far a converter whose codes err by a sine, of amplitude 1, turns an answer.
+
+    Args:
+        across: how far each point of it moves it across its sine, shape (n,).
+        seen: the answer without its noise, shape (n,).
+        step: one code, in its unit.
+        size: of its sine.
+    """
+    heights = 1 + np.linspace(-0.5, 0.5, HEIGHTS) * min(step / size, 1.0)
+    moved = np.exp(2j * np.pi / step * heights[:, None] * seen) * across
+    # wherever the codes lie: a sine and a cosine of the voltage
+    ways = np.hypot(moved.real.sum(axis=1), moved.imag.sum(axis=1))
+    return float(ways.max())
+
+
 def _left_over(
     design: FloatArray,
     inverse: FloatArray,
     cause: FloatArray,
     answer: FloatArray,
     code: float | None,
-) -> tuple[FloatArray, int]:
-    """What the sine and all that is known leave of an answer; columns beside `design`.
+) -> tuple[FloatArray, FloatArray, int]:
+    """What the sine and all that is known leave of an answer, and what they do not.
+
+    The latter without what a converter's codes make of it. Last, columns beside
+    `design`.
 
     Args:
         design: what is fitted, shape (n, columns), sine and cosine first.
@@ -163,21 +188,25 @@ def _left_over(
         code: as `gain` takes it.
     """
     into, out = inverse @ cause, inverse @ answer
-    left = answer - design @ out
+    seen = design @ out
+    left = answer - seen
     beside: list[FloatArray] = []
     # what the cause does beside its sine, such as a source's steps, is no scatter: the
     # answer follows it, a little late
     steps = cause - design @ into
     if np.abs(steps).max() > 1e-9 * math.hypot(into[0], into[1]):
         beside += [steps, np.gradient(steps)]
+    real = len(beside)
     if code:
-        turn = 2 * np.pi * (design @ out) / code
+        turn = 2 * np.pi * seen / code
         beside += [np.sin(turn), np.cos(turn)]
     if beside:
         known = np.column_stack(beside)
         known -= design @ (inverse @ known)
-        left -= known @ (np.linalg.pinv(known) @ left)
-    return left, len(beside)
+        made = np.linalg.pinv(known) @ left
+        left -= known @ made
+        seen += known[:, :real] @ made[:real]
+    return left, seen, len(beside)
 
 
 def _line(left: FloatArray, above: float) -> list[FloatArray]:

@@ -165,3 +165,26 @@ def test_slow_noise_stays_in_the_interval():
         found = gain(time, 0.05 * np.sin(wave), 0.12 * np.sin(wave) + slow, f)
         off[seed], half[seed] = found.gain.value - 2.4, found.gain.half
     assert np.mean(half) > 1.5 * np.std(off)
+
+
+def test_codes_turn_the_phase_of_an_answer_in_stairs():
+    """A source that is set 22 times a second makes stairs of 1 Hz, whose way up has
+    other levels than its way down: three codes high, its phase held in 45 of 60."""
+    time, f, code, n = np.arange(0, 2, 0.0139), 1.0, 0.04, 60
+    rng, held, half = np.random.default_rng(4), np.zeros(2), []
+    for middle, begin in rng.uniform(0, 1, (n, 2)):
+        steps = (np.floor(time * 22 + begin) - begin) / 22
+        cause = 0.05 * np.sin(2 * np.pi * f * steps)
+        answer = code * middle + 2.4 * cause
+        samples = answer[:, None] + rng.normal(0, 5e-3, (time.size, 139))
+        codes = code * np.rint(samples / code)
+        seen, extent = codes.mean(axis=1), np.ptp(codes, axis=1)
+        bias = step_bias(seen, code, 139, extent)
+        found = gain(time, cause, seen, f, bias, code)
+        held += (
+            found.gain.low < 2.4 < found.gain.high,
+            found.phase.low < 0 < found.phase.high,
+        )
+        half.append(found.phase.half)
+    assert np.all(held >= 0.93 * n), held
+    assert np.median(half) < 0.04
