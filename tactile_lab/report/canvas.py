@@ -18,6 +18,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.text import Annotation
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+from matplotlib.transforms import Bbox
 from numpy.typing import ArrayLike
 
 from tactile_lab.arrays import FloatArray
@@ -79,6 +80,8 @@ HEADING = "heading"
 """Names the heading's parts in SVG: a page with a heading of its own hides them."""
 BESIDE = "beside"
 """Names the texts of a series that is drawn as texts alone."""
+ROW = 8.0
+"""From one row of them to the next, points."""
 DASHES, DOTS = (0, (4, 2)), (0, (1, 2.5))
 DPI = 160
 MANY, MOST = 60, 200
@@ -123,11 +126,12 @@ def draw(
         for axes in drawn:
             _clear_of_numbers(axes)
             _stagger(
+                axes,
                 [
                     t
                     for t in axes.texts
                     if isinstance(t, Annotation) and t.get_gid() == BESIDE
-                ]
+                ],
             )
     return figure
 
@@ -142,19 +146,26 @@ def _clear_of_numbers(axes: Axes) -> None:
         axes.yaxis.set_label_coords(clear / axes.bbox.width, 0.5)
 
 
-def _stagger(texts: list[Annotation]) -> None:
-    """Raise texts that would run into the one before; drop what still would."""
-    rows: list[float] = [-np.inf, -np.inf]
+def _stagger(axes: Axes, texts: list[Annotation]) -> None:
+    """Raise texts that would run into another, left to right; drop what still would.
+
+    Numbers stand left of the axes: no text begins there, and none ends right of them.
+    """
+    placed: list[Bbox] = []
     for text in texts:
-        box = text.get_window_extent()
-        row = next((n for n, end in enumerate(rows) if box.x0 > end), None)
-        if row is None:
+        box, (_, up) = text.get_window_extent(), text.xyann
+        aside = max(axes.bbox.x0 - box.x0, 0.0) + min(axes.bbox.x1 - box.x1, 0.0)
+        away = -ROW if text.get_verticalalignment() == "top" else ROW
+        placed = [one for one in placed if one.x1 > box.x0 + aside]
+        for row in (0, 1):
+            text.xyann = (aside * 72 / DPI, up + row * away)
+            box = text.get_window_extent()
+            if not any(box.overlaps(one) for one in placed):
+                room = 0.8 * box.height  # to the next one beside it
+                placed.append(Bbox([[box.x0, box.y0], [box.x1 + room, box.y1]]))
+                break
+        else:
             text.set_visible(False)
-            continue
-        rows[row] = box.x1 + 0.8 * box.height
-        if row:
-            up = -1 if text.get_verticalalignment() == "top" else 1
-            text.xyann = (0, text.xyann[1] + up * 8.0)
 
 
 def _boxes(figure: Figure, plot: Plot) -> list[Axes]:
@@ -250,14 +261,13 @@ def _panel(axes: Axes, panel: Panel, x_factor: float) -> None:
         up = panel.corner == "upper"
         axes.annotate(
             _math(panel.text), (0.99, 1 if up else 0.04), xycoords="axes fraction",
-            ha="right", va="top" if up else "bottom", size=7.5, zorder=20,
+            ha="right", va="top" if up else "bottom", size=7.5, zorder=20, bbox=PLATE,
         )  # fmt: skip
     if panel.note:
         axes.annotate(
             _math(panel.note), (1, 1), (-2, -2), xycoords="axes fraction",
             textcoords="offset points", ha="right", va="top", size=6.5, zorder=20,
-            color=QUIET.light, bbox={"fc": PAPER.light, "ec": "none", "alpha": 0.8,
-            "pad": 1},
+            color=QUIET.light, bbox=PLATE,
         )  # fmt: skip
 
 
@@ -308,6 +318,8 @@ def _guide(axes: Axes, guide: Guide, factor: float) -> None:
         )  # fmt: skip
 
 
+PLATE: Any = {"fc": PAPER.light, "ec": "none", "alpha": 0.8, "pad": 1}
+"""Behind texts within a panel: no line of the grid runs through their digits."""
 RECTANGLE = [Outline.MOVETO, *[Outline.LINETO] * 3, Outline.CLOSEPOLY]
 GREY = {"band": palette.BAND.light, "quiet": RULE.light}
 """Colours of bands that lie behind the grid."""

@@ -117,6 +117,31 @@ def test_labels_of_trials_close_together_can_be_read(apart, level):
         assert not any(box.overlaps(other) for other in boxes[:n])
 
 
+def test_labels_of_presses_of_nearly_one_force_can_be_read():
+    """In a trim's figure the last two ran into each other, the first into the axis."""
+    x = np.arange(12.0) * 1.6 + 1.0
+    level = np.array([90.0] * 10 + [88.0, 92.0])
+    texts = tuple(f"{f:g} mN at 1.4083 V" for f in level)
+    labels = Series(x=x, y=level, mark="text", texts=texts)
+    drawn = axes(Series(x=[0.0, 19.5], y=[0.0, 90.0], mark="line"), labels,
+                 limits=(0.0, 115.0), height=1.15)  # fmt: skip
+    boxes = [t.get_window_extent() for t in drawn.texts if t.get_visible()]
+    assert len(boxes) > 6
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+    inside = [drawn.bbox.x0 - 1 < b.x0 and b.x1 < drawn.bbox.x1 + 1 for b in boxes]
+    assert all(inside)
+
+
+def test_no_line_of_the_grid_runs_through_the_numbers_of_a_fit():
+    line = Series(x=[0.0, 1.0], y=[0.0, 1.0], mark="line")
+    drawn = axes(line, text="tau = 8.69 s (8.66 to 8.72 s, 95 %)")
+    (told,) = drawn.texts
+    plate = told.get_bbox_patch()
+    assert plate is not None and to_hex(plate.get_facecolor()) == palette.PAPER.light
+    assert plate.get_alpha() > 0.7
+    assert told.zorder > max(g.get_zorder() for g in drawn.get_ygridlines())
+
+
 def test_a_logarithmic_axis_has_numbers_that_do_not_run_into_each_other():
     onset = Series(x=[0.0047, 0.012, 0.03, 0.06], y=[1.0, 2.0, 3.0, 4.0], mark="points")
     panels = (Panel(label="Latency", series=(onset,)),) * 2
