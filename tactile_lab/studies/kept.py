@@ -76,6 +76,11 @@ class Kept:
         return "spikes" in self._used
 
     @property
+    def uses_scene(self) -> bool:
+        """Whether it looks at the scene itself."""
+        return "scene" in self._used
+
+    @property
     def _used(self) -> frozenset[str]:
         """Names of a point that it looks up; a function is given the run or result."""
         if self.source:

@@ -27,6 +27,10 @@ On = Literal["model", "simulated", "bench"]
 Order = Literal["random", "blocked", "as written"]
 ALWAYS = ("spike_count", "first_spike", "mean_rate")
 """Kept unless the study says what."""
+SEED = "simulated.seed"
+"""Each repeat has its own, at every point the same ones."""
+MODELLED = ("sensor", "protocol")
+"""Tables that say all there is of a circuit alone and of the force asked for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,6 +183,11 @@ def load_study(study: str | Path | Mapping[str, Any], name: str = "study") -> St
 
 def _study(data: dict[str, Any], name: str, folder: Path, origin: str) -> Study:
     table = validated(StudyFile, tuples(data), (), lambda at: origin, None)
+    if SEED in table.set or any(one.key == SEED for one in table.axis):
+        raise SceneError(
+            f"{origin}: {SEED} is set by the study, for each repeat another; say "
+            "repeat = 12 for twelve of them, or seed = 2 for others."
+        )
     scene = _scene(table, folder)
     axes = []
     for one in table.axis:
@@ -220,6 +229,13 @@ def _study(data: dict[str, Any], name: str, folder: Path, origin: str) -> Study:
         seed=table.seed,
     )
     keeping = kept(table.keep, folder, table.on)
+    if table.on == "model" and not any(one.uses_scene for one in keeping):
+        for asked in table.axis:
+            if asked.key.partition(".")[0] not in MODELLED:
+                raise SceneError(
+                    f"{origin}: axis {asked.key} moves nothing of a circuit alone; "
+                    'leave it out, or say on = "simulated".'
+                )
     study = Study(
         name=name,
         title=table.title or name,

@@ -20,6 +20,17 @@ LARGE = {"key": "sensor.R1", "values": "1 MOhm : 2 MOhm : 100 Ohm"}
 LARGER = {"key": "sensor.R2", "values": "1 MOhm : 2 MOhm : 100 Ohm"}
 
 
+SEEDS = {"key": "simulated.seed", "values": [1, 2]}
+"""Each of them was told with the numbers of one and the same seed."""
+
+
+SPECIMENS = {"key": "simulated.specimen", "values": [0, 1]}
+"""All had the same spikes, as if there were no spread."""
+
+
+LAGS = {"key": "bench.magnet.eddy_lag", "values": ["0 s", "50 ms"]}
+
+
 BOTH = {"key": "sensor.R1", "values": ["1 MOhm"], "normal": "1 %"}
 
 
@@ -44,6 +55,10 @@ BOTH = {"key": "sensor.R1", "values": ["1 MOhm"], "normal": "1 %"}
         ({"require": {"spike_count": {}}}, "asks for nothing"),
         ({"repeat": 2}, "the model gives the same"),
         ({"runs": True}, "makes no runs"),
+        ({"axis": [SEEDS], "on": "simulated"}, "for each repeat another"),
+        ({"set": {"simulated.seed": 3}, "on": "simulated"}, "repeat = 12"),
+        ({"axis": [SPECIMENS]}, "moves nothing of a circuit alone"),
+        ({"axis": [LAGS]}, 'say on = "simulated"'),
         ({"on": "bench"}, "needs real instruments"),
         ({"require": {"spikes": {"least": 1}}}, "nothing of that name is kept"),
         ({"draw": {"points": 4}}, "draws no axis"),
@@ -65,3 +80,8 @@ def test_what_cannot_be_used_is_refused(change: dict, told: str) -> None:
 def test_a_study_that_is_not_there_is_named_with_those_that_are() -> None:
     with pytest.raises(SceneError, match=r'did you mean "spread"\? Studies that ship'):
         load_study("spraed")
+
+
+def test_what_only_the_scene_knows_may_vary_where_it_is_asked_for() -> None:
+    keep = {"lag": "scene.bench.magnet.eddy_lag"}
+    assert load_study({**SHORT, "axis": [LAGS], "keep": keep}).design.size == 2
