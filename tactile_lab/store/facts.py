@@ -22,8 +22,9 @@ TEXTS = (
 _QUANTITY = re.compile(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?) (\S.*)")
 _UNITS = ("N", "s", "V", "A", "T", "Hz", "K", "Ohm", "m")
 """Units that end the name of a result, such as critical_force_N."""
+REST = "rest_V_C1"
 _OF_TRIALS = (
-    ("rest_V_C1", "", "rest_V_C1_V"),
+    (REST, "", "rest_V_C1_V"),
     ("peak_rate", "", "peak_rate_Hz"),
     ("first_spike", "", "latency_s"),
     ("tau", "circuit_adaptation", "tau_s"),
@@ -132,14 +133,29 @@ def of_results(results: Mapping[str, Any]) -> Iterator[Fact]:
     concluded = list(_numbers(results.get("conclusion") or {}))
     yield from concluded
     told = {fact.key for fact in concluded}
-    for trial in results.get("trials") or []:
+    trials = results.get("trials") or []
+    judged = any(trial.get("drift_V") is not None for trial in trials)
+    for trial in trials:
         if trial.get("complete") is False:
             continue
         for key, table, name in _OF_TRIALS:
+            if key == REST and not _rested(trial, judged):
+                continue
             if key not in told:
                 found = trial if not table else trial.get(table) or {}
                 for fact in _number(key, found.get(name), name):
                     yield fact._replace(trial=str(trial.get("label") or ""))
+
+
+def _rested(trial: Mapping[str, Any], judged: bool) -> bool:
+    """Whether the sensor was at rest before a trial, and its probe on it.
+
+    Where drift is judged in the run, that was of the trials it is told of. Else only of
+    one without force: the others' V_GS was moved, or their probe. Older runs tell none.
+    """
+    if "drift_V" not in trial or trial["drift_V"] is not None:
+        return True
+    return not judged and trial.get("level_N") == 0
 
 
 def _numbers(values: Mapping[str, Any]) -> Iterator[Fact]:

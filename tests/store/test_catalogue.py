@@ -141,6 +141,26 @@ def test_what_a_protocol_concludes_stands_for_its_trials_and_is_a_number():
     assert found == [("tau", 3.0, "s"), *[("rest_V_C1", 4.3, "V")] * 2]
 
 
+@pytest.mark.parametrize(
+    ("trials", "rests"),
+    [
+        # a staircase: its second step begins under the first one's force
+        ([(4.34, 0.0, 0.05), (4.23, None, 0.1), (4.43, None, 0.0)], [4.34]),
+        # a wiring check: the probe lay on 0 V
+        ([(-0.02, None, None), (4.35, None, None)], []),
+        # a trim: V_GS was moved
+        ([(4.26, None, 0.09)], []),
+        # a monitor pushes nothing, and judges no drift
+        ([(4.35, None, 0.0)], [4.35]),
+    ],
+)
+def test_V_C1_is_at_rest_where_no_force_is_and_the_probe_is_on_it(trials, rests):
+    """A staircase's rest was 4.18 V beside 4.35 V of the others, a mean under force."""
+    names = "rest_V_C1_V", "drift_V", "level_N"
+    told = of_results({"trials": [dict(zip(names, t, strict=True)) for t in trials]})
+    assert [fact.number for fact in told if fact.key == "rest_V_C1"] == rests
+
+
 def test_a_trial_that_was_cut_short_gives_no_number_to_compare():
     """A chart and a page of runs counted it, and did not say so."""
     whole = {"complete": True, "peak_rate_Hz": 20.0, "latency_s": 0.2}
