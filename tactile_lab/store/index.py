@@ -17,7 +17,7 @@ from tactile_lab.store.facts import KNOWN, Fact
 from tactile_lab.store.where import Condition, condition
 
 FILE = ".index.sqlite"
-VERSION = 6
+VERSION = 7
 """Of the tables and of what they hold; another one is thrown away."""
 PATIENCE = 2.0
 """Longest wait for another program that writes the index, s."""
