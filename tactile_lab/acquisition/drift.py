@@ -75,7 +75,9 @@ class Drift:
     def plays(self, current: Waveform, begin: float) -> None:
         """The coil plays `current`, A against s from run time `begin` s."""
         force = self._force_for(current)
-        moved = np.flatnonzero(np.diff(force.value, prepend=self._film.force))
-        if moved.size:
-            self._still = begin + float(force.time[moved[-1]])
+        # a list rounds: far behind its last push some 1e-12 N are left of it
+        felt = np.abs(np.append(self._film.force, force.value)) > NOTHING
+        if felt.any():
+            after = min(int(np.flatnonzero(felt)[-1]), force.time.size - 1)
+            self._still = begin + float(force.time[after])
         self._film.feels(force, begin)

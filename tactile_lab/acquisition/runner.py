@@ -177,12 +177,12 @@ class Runner:
         if trial.probes != self._probes:
             self._move_probes(trial.probes)
         self._hold(trial.voltages)
+        drive = self._prepared(trial)  # the film forgets while a list is loaded
         since = self.intake.reached - BASELINE
         rest = self._live.levels(since, self.intake.reached)
         cut_off = self.intake.cut_off(since)
         drift = self._drifted(rest, cut_off="V_C1" in cut_off)
         rest.update(dict.fromkeys(cut_off, math.nan))
-        drive = self._prepared(trial)
         asked = self._program.asked_field if trial.hold is not None else None
         coil = self.instruments.coil
         if coil is not None and drive is not None and drive.points is not None:

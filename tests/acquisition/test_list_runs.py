@@ -57,6 +57,20 @@ def test_the_list_is_loaded_once_and_its_loading_is_a_planned_pause(ran):
     assert run.current["listed"].sum() > 700
 
 
+def test_rest_is_seen_when_the_list_is_loaded_and_judged_for_drift(run_scene):
+    """It was V_C1 from before the loading, 40 mV off where that takes 14 s."""
+    short = 'protocol.levels=["200 mN", "150 mN"]', "protocol.rest=0.6 s"
+    with run_scene(*LIST, *short, "simulated.noise.V_C1=20 mV").stored() as run:
+        second = run.trials[1]
+        loaded = second["start"] - run.trials["end"][0]
+        trace = run.signal("V_C1").trace(cells=10**6)
+        before = (trace.time > second["start"] - 0.1) & (trace.time < second["start"])
+        just = trace.mean[before].mean()
+        assert loaded > 3.0
+        assert second["rest_V_C1"] == pytest.approx(just, abs=1.5e-3)
+        assert abs(second["drift_V_C1"]) < 3e-3
+
+
 def test_its_points_stand_where_the_samples_show_them(ran):
     """Not where the host began to tell the source to start: up to 40 ms before."""
     assert ran.lateness() == pytest.approx([0.0, 0.0], abs=2e-3)

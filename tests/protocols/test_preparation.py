@@ -138,6 +138,17 @@ def test_only_a_sensor_at_rest_is_judged():
     assert watch.before(4.4, 6.0) is not None
 
 
+def test_what_a_list_leaves_far_behind_its_push_is_no_force():
+    """Its points round: no touch, texture or vibration was ever judged for drift."""
+    rest = rest_V_C1(Circuit())
+    watch = Drift(Circuit(), lambda current: current, limit=0.1)
+    watch.before(rest, 0.0)
+    left = [(0.0, 0.0), (0.1, 1e-3), (0.2, 1e-12), (4.9, 2e-12), (5.0, 0.0)]
+    watch.plays(Waveform.through(left), 0.0)
+    assert watch.before(rest, 0.3) is None
+    assert watch.before(rest, 5.0) == pytest.approx(0, abs=1e-3)
+
+
 def test_a_rest_that_was_cut_off_gives_no_drift_but_may_end_the_run():
     watch = Drift(Circuit(), lambda current: current, limit=0.1)
     assert watch.before(4.5, 0.0, cut_off=True) is None
