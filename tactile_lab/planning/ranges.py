@@ -34,6 +34,9 @@ between two bends, and not much later than the first."""
 SPARE = 1 / 127
 """Part of a range, one code of 8 bits, that should be left at either end."""
 
+PEAKS = 3.0
+"""Standard deviations of noise that a range should hold."""
+
 
 @dataclass(frozen=True, eq=False)
 class Seen:
@@ -42,11 +45,13 @@ class Seen:
     Attributes:
         low, high: least and largest value, V.
         sampled: at even times of what is streamed, shape (n,), V.
+        swing: how far a simulated bench's noise and hum take it beyond, V.
     """
 
     low: float
     high: float
     sampled: FloatArray
+    swing: float = 0.0
 
     def outside(self, channel: Channel) -> float:
         """Part of the samples that lie beyond the range of their channel."""
@@ -87,14 +92,23 @@ def expected(scene: Scene, channels: Sequence[Channel], drive: Timeline) -> Expe
     seen = zip(names, (samples.value for samples in looked), strict=True)
     even = np.linspace(0.0, until, GRID)
     streamed = drive.streams_at(even)
+    swings = {one.signal: _swing(scene, one) for one in channels}
     told = {
-        name: Seen(float(v.min()), float(v.max()), v[:GRID][streamed])
+        name: Seen(float(v.min()), float(v.max()), v[:GRID][streamed], swings[name])
         for name, v in seen
     }
     if (fires := told.get("V_C2")) is not None:
         high = max(fires.high, scene.circuit.fire_voltage)
         told["V_C2"] = replace(fires, low=min(fires.low, 0.0), high=high)
     return told
+
+
+def _swing(scene: Scene, channel: Channel) -> float:
+    """How far noise and hum at the scope's input take a signal beyond the model's."""
+    if not scene.bench.simulated:
+        return 0.0
+    noise = scene.simulated.noise.get(channel.signal, 0.0)
+    return abs(channel.scale) * (scene.simulated.hum + PEAKS * noise)
 
 
 def _looked_at(force: Waveform, until: float, tau: float) -> FloatArray:
@@ -138,15 +152,16 @@ def beyond(channels: Sequence[Channel], seen: Expected) -> Iterator[str]:
         if channel.signal not in seen or _sees(channel, seen[channel.signal]):
             continue
         (low, high), one = channel.span, seen[channel.signal]
+        and_more = f", noise and hum {show(one.swing, 'V')} more" if one.swing else ""
         yield (
             f"{channel.signal} will leave its channel's range, {show(low, 'V')} to "
             f"{show(high, 'V')}: the model has {show(one.low, 'V')} to "
-            f"{show(one.high, 'V')}. Change range or offset in the bench file, or let "
-            "auto_range = true choose."
+            f"{show(one.high, 'V')}{and_more}. Change range or offset "
+            "in the bench file, or let auto_range = true choose."
         )
 
 
 def _sees(channel: Channel, seen: Seen, spare: float = 0.0) -> bool:
     low, high = channel.span
-    spare *= abs(channel.scale)
+    spare = max(spare * abs(channel.scale), seen.swing)
     return low + spare <= seen.low and seen.high <= high - spare

@@ -502,6 +502,18 @@ def test_a_drain_current_keeps_the_v_c1_that_it_is_derived_from():
         assert less.needs.stored == ("V_C2",)
 
 
+def test_hum_that_cuts_a_signal_off_is_planned_for(fixed_ranges):
+    """The plan knew of 60 mV; the run had V_C1 cut off, and refused its gains."""
+    loud = ["simulated.hum=60 mV", "protocol.count=2", "protocol.lowest=0.3 Hz"]
+    told = " ".join(plan(load("sine_sweep", loud, bench=fixed_ranges)).warnings)
+    assert "V_C1 will leave its channel's range, 500 mV to 4.5 V" in told
+    assert "noise and hum 75 mV more" in told
+    wider = next(c for c in needs(load("sine_sweep", loud)).channels if c.input == "A")
+    assert wider.range > 2.0
+    quiet = next(c for c in needs(load("sine_sweep")).channels if c.input == "A")
+    assert quiet.range == 2.0
+
+
 @pytest.mark.parametrize(
     ("scene", "why"),
     [
