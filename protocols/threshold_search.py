@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from tactile_lab.analysis.carried_over import Begun, remembered
 from tactile_lab.analysis.estimate import student_95
 from tactile_lab.analysis.rate_force import Bracket, onset
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
@@ -27,6 +28,8 @@ from tactile_lab.waveform import Waveform
 Resolution = Annotated[float, Unit("N", above=0.0)]
 TOLD = 1e-3
 """Part of V_fire by which it has to scatter to be told."""
+NOTED = 0.1
+"""Part of half a bracket from which on what the film held is told."""
 SCATTER_UNKNOWN = (
     "The intervals in the holds do not tell how far V_fire scatters from spike to "
     "spike: by what a single press may lie off for it is in none of these numbers."
@@ -127,13 +130,23 @@ def critical_force(run: Measurement, ramp: float, hold: float) -> Conclusion:
     told = _scatter_of_V_fire(run)
     noise = told or 0.0
     known, scatter = run.uncertain(found.middle), _moved_by(run, noise)
+    left = _left_in_film(run, found)
     values = {
         "critical_force_N": found.middle,
         "critical_force_half_width_N": found.half_width,
         "critical_force_scatter_N_95": scatter,
+        "critical_force_left_in_film_N": left,
     }
-    whole = math.hypot(found.half_width, scatter, known or 0.0)
+    whole = math.hypot(found.half_width + abs(left), scatter, known or 0.0)
     parts, said = ["half the bracket"], []
+    if abs(left) > NOTED * found.half_width:
+        parts.append("what the film held")
+        more = "more" if left * found.middle > 0 else "less"
+        said.append(
+            "The film still held a part of the forces before (Eq. (7)): from rest "
+            f"these presses are as up to {show(abs(left), 'N', 2)} {more}. "
+            "protocol.residual says when the next one begins."
+        )
     if _is_told(run, noise):
         parts.append("V_fire's scatter")
         said.append(
@@ -154,7 +167,7 @@ def critical_force(run: Measurement, ramp: float, hold: float) -> Conclusion:
         )
     if known is None:
         said += run.not_stated
-    gate = _gate(run, found, known or 0.0, noise)
+    gate = _gate(run, found, math.hypot(left, known or 0.0), noise)
     return Conclusion((sentence, *said), values) + gate
 
 
@@ -183,7 +196,7 @@ def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterato
     try:
         found = _onset(trials)
         half = math.hypot(
-            found.half_width,
+            found.half_width + abs(_left_in_film(run, found)),
             _moved_by(run, _scatter_of_V_fire(run) or 0.0),
             run.uncertain(found.middle) or 0.0,
         )
@@ -242,6 +255,19 @@ def rate_against_force(run: Measurement, caption: str, *more: Series) -> Iterato
 def _onset(trials: Sequence[MeasuredTrial]) -> Bracket:
     forces = [float(t.level or 0.0) for t in trials]
     return onset(forces, [t.response.spikes for t in trials])
+
+
+def _left_in_film(run: Measurement, found: Bracket) -> float:
+    """The most that forces before left in the film at the presses of a bracket, N."""
+    if run.circuit is None:
+        return 0.0
+    pressed = [Begun(t.label, t.start, t.level) for t in run.results if t.level]
+    held = [
+        left
+        for trial, left in remembered(run.circuit, run.force, pressed)
+        if trial.level in (found.silent, found.fires)
+    ]
+    return max(held, key=abs, default=0.0)
 
 
 def _gate(

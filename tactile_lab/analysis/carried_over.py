@@ -8,7 +8,7 @@ spikes than the same trial from rest.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -40,21 +40,9 @@ def carried_over(
         force: of the whole run, N against s.
         trials: in order; those that begin under a force are passed over.
     """
-    if not circuit.k_F:
-        return None  # a film that no force charges remembers none
-    film, at, from_none = Film(circuit), 0, 0
     late: list[tuple[float, float, Begun]] = []
-    for trial in trials:
-        until = int(np.searchsorted(force.time, trial.start))
-        until += bool(trial.start in force.time[until : until + 1])  # before a jump
-        if until > at + 1:
-            begin = float(force.time[at])
-            piece = Waveform(force.time[at:until] - begin, force.value[at:until])
-            film.feels(piece, begin)
-            at = until - 1  # the next piece goes on from this point
-        if abs(film.force) > LITTLE * abs(trial.level):
-            continue  # it goes on from the force before, as a stair does
-        left = film.V_P(trial.start) / circuit.k_F
+    from_none = 0
+    for trial, left in remembered(circuit, force, trials):
         share, from_none = abs(left / trial.level), from_none + 1
         if share > LITTLE:
             late.append((share, left, trial))
@@ -70,3 +58,26 @@ def carried_over(
         f"{show(circuit.tau * math.log(share / LITTLE), 's', 2)} more of rest would "
         f"leave {100 * LITTLE:g} % of its force."
     )
+
+
+def remembered(
+    circuit: Circuit, force: Waveform, trials: Iterable[Begun]
+) -> Iterator[tuple[Begun, float]]:
+    """Each trial that begins under no force, and what the film holds then, as N.
+
+    At first it acts as its own force and that would from rest. Arguments as of
+    `carried_over`.
+    """
+    if not circuit.k_F:
+        return  # a film that no force charges remembers none
+    film, at = Film(circuit), 0
+    for trial in trials:
+        until = int(np.searchsorted(force.time, trial.start))
+        until += bool(trial.start in force.time[until : until + 1])  # before a jump
+        if until > at + 1:
+            begin = float(force.time[at])
+            piece = Waveform(force.time[at:until] - begin, force.value[at:until])
+            film.feels(piece, begin)
+            at = until - 1  # the next piece goes on from this point
+        if abs(film.force) <= LITTLE * abs(trial.level):  # no stair of the one before
+            yield trial, film.V_P(trial.start) / circuit.k_F

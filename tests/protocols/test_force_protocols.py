@@ -369,7 +369,9 @@ def test_threshold_search_carries_the_scatter_of_V_fire_into_V_GS():
     assert "V_fire scatters by ±" in found.text
     assert steady.values["critical_force_scatter_N_95"] < 1e-4
     scatter = found.values["critical_force_scatter_N_95"]
-    half = math.hypot(found.values["critical_force_half_width_N"], scatter)
+    bracket = found.values["critical_force_half_width_N"]
+    film = abs(found.values["critical_force_left_in_film_N"])
+    half = math.hypot(bracket + film, scatter)
     assert f"and V_fire's scatter: ±{show(half, 'N', 2)} (95 %)" in found.text
     (plot,) = search.plots(replace(run, trials=(scattered, *run.trials[1:])))
     (band,) = plot.panels[0].guides
@@ -383,6 +385,24 @@ def test_threshold_search_carries_the_scatter_of_V_fire_into_V_GS():
         for told in (steady, found)
     )
     assert after > 1.2 * before
+
+
+def test_what_the_film_held_is_told_of_a_bracket_that_is_no_wider():
+    """Of 12 true critical forces 9 lay within half a bracket of 0.16 mN."""
+    steps = [pulse(0.14), recovery(), pulse(0.0967), recovery(), pulse(0.0969)]
+    run = modelled("threshold_search", steps)
+    began = [t.start for t in run.results if t.level][1:]
+    film = simulate(run.circuit, run.force, keep=("V_P",), until=began[-1])
+    found = ThresholdSearch().conclude(run)
+    left = found.values["critical_force_left_in_film_N"]
+    most = max(film.sample("V_P", began), key=abs)
+    assert left == pytest.approx(most / run.circuit.k_F, rel=0.01)
+    assert left < -0.2 * found.values["critical_force_half_width_N"]
+    assert f"from rest these presses are as up to {show(-left, 'N', 2)} less" in (
+        found.text
+    )
+    wide = modelled("threshold_search", [pulse(0.14), recovery(), pulse(0.09)])
+    assert "film still held" not in ThresholdSearch().conclude(wide).text
 
 
 def test_a_scatter_that_is_not_known_is_told_as_such():
