@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from tactile_lab.analysis.carried_over import Begun, remembered
 from tactile_lab.analysis.estimate import student_95
 from tactile_lab.analysis.rate_force import Bracket, onset
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
@@ -141,12 +140,7 @@ def critical_force(run: Measurement, ramp: float, hold: float) -> Conclusion:
     parts, said = ["half the bracket"], []
     if abs(left) > NOTED * found.half_width:
         parts.append("what the film held")
-        more = "more" if left * found.middle > 0 else "less"
-        said.append(
-            "The film still held a part of the forces before (Eq. (7)): from rest "
-            f"these presses are as up to {show(abs(left), 'N', 2)} {more}. "
-            "protocol.residual says when the next one begins."
-        )
+        said.append(still_held(left, found.middle))
     if _is_told(run, noise):
         parts.append("V_fire's scatter")
         said.append(
@@ -259,15 +253,18 @@ def _onset(trials: Sequence[MeasuredTrial]) -> Bracket:
 
 def _left_in_film(run: Measurement, found: Bracket) -> float:
     """The most that forces before left in the film at the presses of a bracket, N."""
-    if run.circuit is None:
-        return 0.0
-    pressed = [Begun(t.label, t.start, t.level) for t in run.results if t.level]
-    held = [
-        left
-        for trial, left in remembered(run.circuit, run.force, pressed)
-        if trial.level in (found.silent, found.fires)
-    ]
-    return max(held, key=abs, default=0.0)
+    between = found.silent, found.fires
+    return run.left_in_film(t for t in run.results if t.level in between)
+
+
+def still_held(left: float, level: float) -> str:
+    """What it means that the film held `left` N as presses with `level` N began."""
+    more = "more" if left * level > 0 else "less"
+    return (
+        "The film still held a part of the forces before (Eq. (7)): from rest these "
+        f"presses are as up to {show(abs(left), 'N', 2)} {more}. protocol.residual "
+        "says when the next one begins."
+    )
 
 
 def _gate(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from protocols.threshold_search import NOTED, still_held
 from tactile_lab.analysis.error_budget import ErrorBudget
 from tactile_lab.analysis.rate_force import Bracket
 from tactile_lab.conclusion import NOT_SEARCHED, Conclusion
@@ -177,6 +178,11 @@ class ThresholdTrim(Recovering):
         held = [(run.source_read("V_GS", trial), trial) for trial in trials]
         return [(volts, trial) for volts, trial in held if volts is not None]
 
+    def left_in_film(self, run: Measurement, found: Bracket) -> float:
+        """The most that presses before left in the film at those of a bracket, N."""
+        between = found.silent, found.fires
+        return run.left_in_film(t for v, t in self._pressed(run) if v in between)
+
     def _found(self, run: Measurement) -> TrimmedGate:
         pressed = self._pressed(run)
         silent = [volts for volts, trial in pressed if not trial.response.spikes]
@@ -223,20 +229,27 @@ class TrimmedGate(Bracket):
     def conclusion(self, run: Measurement, asked: ThresholdTrim) -> Conclusion:
         """What it means, in sentences and values."""
         wanted = asked.wanted
+        film, slope = asked.left_in_film(run, self), 0.0
+        if run.circuit is not None:
+            slope = abs(run.circuit.k_F)
+        half = self.half_width + slope * abs(film)
         values: dict[str, float | None] = {
             "V_GS_V": self.middle,
             "V_GS_half_width_V": self.half_width,
             "critical_force_N": wanted,
+            "critical_force_left_in_film_N": film,
         }
         sentences = [
-            f"V_GS = {plus_minus(self.middle, self.half_width, 'V')}, as "
+            f"V_GS = {plus_minus(self.middle, half, 'V')}, as "
             f"its source reads it, puts the critical force at {show(wanted, 'N')} for "
             f"a ramp of {asked.ramp:g} s and a hold of {asked.hold:g} s: silent at "
             f"{show(self.silent, 'V', 6)}, fires at {show(self.fires, 'V', 6)}. To use "
             f'it, write [sensor] V_GS = "{self.middle:.5f} V" and sourced = ["V_GS"].'
         ]
+        if slope * abs(film) > NOTED * self.half_width:
+            sentences.append(still_held(film, wanted) + " That is in the ±.")
         error = run.source_error("V_GS", self.middle)
-        parts = {"resolution": self.half_width, "source": error}
+        parts = {"resolution": half, "source": error}
         budgets = {"V_GS": ErrorBudget("V", parts)}
         whole = budgets["V_GS"].whole
         values["V_GS_uncertainty_V"] = None if error is None else whole
@@ -246,8 +259,8 @@ class TrimmedGate(Bracket):
                 "bound that the source's maker gives for its reading is in it."
             )
         if run.circuit is not None:
-            left = self.half_width / abs(run.circuit.k_F)
-            values["critical_force_half_width_N"] = left
+            values["critical_force_half_width_N"] = self.half_width / slope
+            left = half / slope
             known = run.uncertain(wanted)
             budget = ErrorBudget("N", {"resolution": left, "force": known})
             budgets["critical force"] = budget

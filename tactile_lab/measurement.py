@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.analysis.adaptation import Adaptation, fit_adaptation
+from tactile_lab.analysis.carried_over import Begun, remembered
 from tactile_lab.analysis.converter import step_bias
 from tactile_lab.analysis.estimate import standard_error
 from tactile_lab.analysis.spike_train import Response, respond
@@ -270,6 +271,22 @@ class Measurement:
     def turned(self, frequency: float) -> complex:
         """A sine of that force over the force believed, at a frequency in Hz."""
         return self.lag.turned(frequency, self.lag_uncertainty or 0.0)
+
+    def left_in_film(self, trials: Iterable[MeasuredTrial]) -> float:
+        """The most that forces before left in the film as some trials began, as N.
+
+        Of those that begin under no force; 0 without a circuit, which has the film.
+        """
+        if self.circuit is None:
+            return 0.0
+        pressed = [Begun(t.label, t.start, t.level) for t in self.results if t.level]
+        starts = {trial.start for trial in trials}
+        held = [
+            left
+            for one, left in remembered(self.circuit, self.force, pressed)
+            if one.start in starts
+        ]
+        return max(held, key=abs, default=0.0)
 
     def circuit_adaptation(
         self, trial: MeasuredTrial

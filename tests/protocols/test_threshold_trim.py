@@ -12,8 +12,10 @@ from tactile_lab.engine.execution import Execution
 from tactile_lab.errors import LimitError, SceneError
 from tactile_lab.measurement import MeasuredTrial, Measurement
 from tactile_lab.model.circuit import Circuit
+from tactile_lab.model.simulate import simulate
 from tactile_lab.planning.needs import needs
 from tactile_lab.planning.plan import plan
+from tactile_lab.quantity import plus_minus, show
 from tactile_lab.report.from_run import read
 from tactile_lab.scene.load import load
 from tactile_lab.trial import Outcome
@@ -108,6 +110,25 @@ PRESSES = [
     (1.45, 0.09, 5), (1.38, 0.09, 0), (1.41, 0.09, 1), (1.40, 0.09, 0),
     (1.405, 0.088, 0), (1.405, 0.092, 2),
 ]  # fmt: skip
+
+
+def test_what_the_film_held_of_the_press_before_is_in_how_well_V_GS_is_known():
+    """As shipped the true critical force lay within half a bracket in 9 of 12."""
+    push = Waveform.pulse(0.09, ramp=0.25, hold=1.0, rest=8.5)
+    twice = push.then(push)
+    run = replace(measured([(1.41, 0.09, 1), (1.4, 0.09, 0)]), force=twice)
+    found = ThresholdTrim(margin=0.0).conclude(run)
+    circuit = run.circuit
+    (V_P,) = simulate(circuit, twice, keep=("V_P",), until=10.0).sample("V_P", [10.0])
+    left = found.values["critical_force_left_in_film_N"]
+    assert left == pytest.approx(V_P / circuit.k_F, rel=0.01)
+    known = 0.005 / circuit.k_F + abs(left)
+    assert f"within ±{show(known, 'N', 2)} of that" in found.text
+    assert f"as up to {show(abs(left), 'N', 2)} less" in found.text
+    assert f"V_GS = {plus_minus(1.405, circuit.k_F * known, 'V')}, as" in found.text
+    error = 0.0003 + 0.00012 * 1.405
+    whole = np.hypot(circuit.k_F * known, error)
+    assert found.values["V_GS_uncertainty_V"] == pytest.approx(whole)
 
 
 def test_the_conclusion_tells_V_GS_its_errors_and_the_check():
