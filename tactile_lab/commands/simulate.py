@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -101,6 +102,8 @@ def answer(scene: Scene, result: Result, samples: int | None) -> dict[str, Any]:
     warnings = list(result.warnings)
     for name in bench_only:
         warnings.append(f"{name} exists only on a bench; simulate leaves it out.")
+    for key in _of_the_bench(scene):
+        warnings.append(f"{key} is the simulated bench's; simulate leaves it out.")
     spikes = result.spike_times if "spikes" in wanted else None
     return {
         "spike_times_s": None if spikes is None else spikes.tolist(),
@@ -113,6 +116,16 @@ def answer(scene: Scene, result: Result, samples: int | None) -> dict[str, Any]:
         "left_out": [*result.left_out, *bench_only],
         "warnings": warnings,
     }
+
+
+def _of_the_bench(scene: Scene) -> list[str]:
+    """Keys of [simulated] that are not as usual; a seed alone changes nothing."""
+    from tactile_lab.scene.tables import Simulated
+
+    asked, usual = scene.simulated, Simulated()
+    names = [one.name for one in fields(Simulated) if one.name != "seed"]
+    moved = (name for name in names if getattr(asked, name) != getattr(usual, name))
+    return [f"simulated.{name}" for name in moved]
 
 
 def _sampled(scene: Scene, result: Result, samples: int) -> dict[str, list[float]]:

@@ -48,6 +48,17 @@ def test_all_keys_are_always_there(tactile_lab, sanity):
         assert data["run_time_s"] >= 0
 
 
+def test_what_only_the_simulated_bench_has_is_said_to_be_left_out(tactile_lab, sanity):
+    """Specimen 3 had the spikes of no specimen, and nothing was said."""
+    spikes = '[record]\nsignals = ["spikes"]\n'
+    more = spikes + '[simulated]\nspecimen = 3\nseed = 4\nV_fire_noise = "20 mV"\n'
+    told = tactile_lab("simulate", sanity(more), "--json").json["warnings"]
+    left = "is the simulated bench's; simulate leaves it out."
+    assert told == [f"simulated.V_fire_noise {left}", f"simulated.specimen {left}"]
+    seeded = spikes + "[simulated]\nseed = 4\n"
+    assert tactile_lab("simulate", sanity(seeded), "--json").json["warnings"] == []
+
+
 def test_what_is_not_asked_for_is_null(tactile_lab, sanity):
     path = sanity('[record]\nsignals = ["V_C1"]\n')
     data = tactile_lab("simulate", path, "--json", "--samples", 3).json
