@@ -194,9 +194,8 @@ critical force held in 16 of 20 searches and 9 of 12 trims before, in all of the
 Since then, too, the phase of a `sine_sweep` holds what a converter's codes do to an
 answer in stairs. Over a bias of 100 mN, where they are 39 mV, that of 1 Hz held in 12
 of 20 runs before and in 20 since; of the rows here, first 20 seeds, no interval moved
-by more than 7 %. Stairs have a cost that is in no interval yet: with a source of 4800
-baud, one step in 0.14 s, phases of 0.05 and 0.3 Hz come some 1 ms late (13 and 17 of 20
-held).
+by more than 7 %. With a source of 4800 baud, one step in 0.14 s, phases of 0.05 and
+0.3 Hz came some 1 ms late (13 and 17 of 20 held); that is in no interval yet.
 
 "One number repeated" is no evidence of coverage, however many runs gave it. Offset and
 gain of `wiring_check` are such: the probes on 0 V and V_S pass by all that is drawn,
