@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from protocols.threshold_search import critical_force, rate_against_force
-from tactile_lab.analysis.circuit_adaptation import FOLLOWED
+from tactile_lab.analysis.circuit_adaptation import followed
 from tactile_lab.analysis.estimate import Estimate
 from tactile_lab.analysis.rate_force import eq15_rate, fit_rate_law
 from tactile_lab.analysis.spike_train import within
@@ -102,7 +102,8 @@ def _slope(run: Measurement, ramp: float) -> Conclusion:
     trains = []
     for t in rated:
         begin, end = t.held or (0.0, 0.0)
-        trains.append(within(t.spike_times + t.start, (begin + FOLLOWED, end)))
+        begin += followed(run.circuit, t.came)
+        trains.append(within(t.spike_times + t.start, (begin, end)))
     believed = simulate(run.circuit, run.force, keep=("V_P",), until=run.duration)
     try:
         law = fit_rate_law(

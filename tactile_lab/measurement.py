@@ -141,6 +141,11 @@ class MeasuredTrial:
         return self.label + unlike_asked(complete=self.complete, skipped=self.skipped)
 
     @property
+    def came(self) -> float:
+        """Time the force took to be there, s; 0 without a hold."""
+        return 0.0 if self.hold is None else self.hold[0] - (self.onset or 0.0)
+
+    @property
     def held(self) -> tuple[float, float] | None:
         """(start, end) of the constant part on the run's time axis, s, or None."""
         if self.hold is None:
@@ -313,11 +318,11 @@ class Measurement:
         if self.circuit is None or trial.hold is None:
             return None, "no hold, or no circuit to compare with"
         from tactile_lab.analysis.circuit_adaptation import (
-            FOLLOWED,
             fit_circuit_adaptation,
+            followed,
         )
 
-        hold = trial.hold[0] + FOLLOWED, trial.hold[1]
+        hold = trial.hold[0] + followed(self.circuit, trial.came), trial.hold[1]
         try:
             found = fit_circuit_adaptation(
                 self.circuit, trial.spike_times, hold, self.displaced.values()

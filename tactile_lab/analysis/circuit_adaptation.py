@@ -31,7 +31,10 @@ FEWEST_INTERVALS = 6
 LUCKY = 0.95
 """The scatter is at most so much larger than it seems, with this probability."""
 FOLLOWED = 0.03
-"""Time after the force is there until the core's field and node A have followed, s."""
+"""Time after the force is there until the core's field and node A have followed, s; a
+force that comes faster than a ramp of 0.25 s takes more, see `followed`."""
+BEHIND = 2e-4
+"""Part of what V_C1 falls by that node A may still lack then."""
 SMALLEST_SCATTER = 1e-5
 """V_fire is told no better than a detector's microsecond lets it, V."""
 
@@ -67,6 +70,18 @@ class CircuitAdaptation:
         t = np.asarray(time, dtype=np.float64) - self.hold[0] - self.circuit.tau_A
         decayed = self.V_P.value * np.exp(-t / self.tau.value)
         return Charging(self.circuit).rate(self.V_GS.value + decayed)
+
+
+def followed(circuit: Circuit, came: float) -> float:
+    """Time after the force is there until the core's field and node A have followed, s.
+
+    Args:
+        circuit: whose node A it is.
+        came: time the force took, s: the less, the further node A is behind.
+    """
+    part = came / circuit.tau_A
+    behind = -math.expm1(-part) / part if part > 0 else 1.0
+    return max(FOLLOWED, circuit.tau_A * math.log(behind / BEHIND))
 
 
 def fit_circuit_adaptation(

@@ -15,7 +15,7 @@ from tactile_lab.errors import NotIdentifiableError, RunFolderError
 from tactile_lab.model.drain_current import DrainCurrent
 from tactile_lab.quantity import show
 from tactile_lab.signals import SIGNALS
-from tactile_lab.store.applied_trial import holds
+from tactile_lab.store.applied_trial import holds, onsets
 from tactile_lab.store.derived import derivable, drain_current_of
 from tactile_lab.store.layout import RECORDS
 from tactile_lab.store.selection import Selection
@@ -66,8 +66,8 @@ class Run(StoredRun):
                 or a tau they leave open.
         """
         from tactile_lab.analysis.circuit_adaptation import (
-            FOLLOWED,
             fit_circuit_adaptation,
+            followed,
         )
 
         rows = self.trials
@@ -77,11 +77,12 @@ class Run(StoredRun):
         growing = self.status == "running"
         if why := (uncounted(self) if growing else self._uncounted)[trial]:
             raise NotIdentifiableError(why)
-        start = float(rows[trial]["start"])
+        start, circuit = float(rows[trial]["start"]), self.scene.circuit
+        came = held[0] - (onsets(self, rows)[trial] or 0.0)
         return fit_circuit_adaptation(
-            self.scene.circuit,
+            circuit,
             self.spikes["time"],
-            (start + held[0] + FOLLOWED, start + held[1]),
+            (start + held[0] + followed(circuit, came), start + held[1]),
             self.scene.displaced.values(),
         )
 

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from tactile_lab.analysis.adaptation import fit_adaptation
-from tactile_lab.analysis.circuit_adaptation import fit_circuit_adaptation
+from tactile_lab.analysis.circuit_adaptation import (
+    FOLLOWED,
+    fit_circuit_adaptation,
+    followed,
+)
 from tactile_lab.deviation import Deviation
 from tactile_lab.errors import NotIdentifiableError
 from tactile_lab.model.circuit import Circuit
@@ -50,6 +54,19 @@ def test_a_scatter_that_is_small_by_luck_tells_no_tau():
     wobble = np.random.default_rng(74).normal(0, 1.5e-4, spikes.size)
     with pytest.raises(NotIdentifiableError, match="factor 2"):
         fit_circuit_adaptation(Circuit(), spikes + np.cumsum(wobble), (0.1, 0.6))
+
+
+@pytest.mark.parametrize("ramp", [0.0, 0.008, 0.02, 0.25])
+def test_it_waits_longer_for_node_A_after_a_force_that_came_faster(ramp):
+    """30 ms were waited after any: a touch of 8 ms told a tau of 9.1 s, with a
+    converter's and the coil's errors 9.7 s, always at the same end of its interval."""
+    circuit, force = Circuit(), Waveform.pulse(0.16, ramp=ramp, hold=0.7)
+    spikes = simulate(circuit, force, keep=("spikes",)).spike_times
+    waited = followed(circuit, ramp)
+    found = fit_circuit_adaptation(circuit, spikes, (ramp + waited, ramp + 0.7))
+    assert found.tau.value == pytest.approx(circuit.tau, rel=1e-3)
+    assert found.V_GS.value == pytest.approx(circuit.V_GS, abs=5e-5)
+    assert (waited == FOLLOWED) is (ramp == 0.25)
 
 
 @pytest.mark.parametrize("level", [0.02, 0.03, 0.04])
