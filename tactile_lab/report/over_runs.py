@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -76,7 +76,11 @@ class OverRuns:
             )
         ordered = tuple(sorted(points, key=lambda one: (one.started, one.run)))
         enough = len(ordered) >= LEAST
-        chart = control_chart([one.value for one in ordered]) if enough else None
+        values = [one.value for one in ordered]
+        chart = control_chart(values) if enough else None
+        counts = not unit and all(v >= 0 and v.is_integer() for v in values)
+        if chart is not None and counts:
+            chart = replace(chart, low=max(chart.low, 0.0))
         return cls(key, unit, ordered, chart)
 
     @property

@@ -57,6 +57,15 @@ def test_equal_values_lie_within_and_do_not_drift():
     assert same.sentences[-1] == "All lie within, and none drifts."
 
 
+def test_no_number_of_spikes_below_none_is_usual():
+    """ "Usual is −215 to 340.8" of spikes was told."""
+    found = OverRuns.of("spikes", "", points([3.0, 60.0, 0.0, 49.0, 470.0] * 3))
+    (usual,) = (text for text in found.sentences if text.startswith("Usual"))
+    assert usual.startswith("Usual is 0 to ")
+    volts = OverRuns.of("rest_V_C1", "V", points([3.0, 60.0, 0.0, 49.0, 470.0] * 3))
+    assert volts.chart is not None and volts.chart.low < 0
+
+
 def test_what_lies_outside_is_not_told_as_a_limit():
     values = [8.6900, 8.6901] * 6
     found = OverRuns.of("tau", "s", points([*values, 8.69045]))
