@@ -44,7 +44,7 @@ def serial_source(table: CoilSpec, world: World) -> CoilSource:
     from sim_backend.serial_line.faults import SerialFault
     from sim_backend.serial_line.wires import plug_in
 
-    row = coil_dialect(table.dialect)
+    row = coil_dialect(table.dialect).of_one(serial=None, timeout=table.timeout)
     wire = row.serial.at(table.baud)
     given = world.faults.get("coil", ())
     faults = [one for one in given if isinstance(one, SerialFault)]
@@ -122,7 +122,7 @@ def serial_meter(table: FieldMeterSpec, world: World) -> Teslameter:
     from sim_backend.serial_line.wires import plug_in
     from sim_backend.teslameter import meter_far_end
 
-    row = teslameter_dialect(table.dialect)
+    row = teslameter_dialect(table.dialect).of_one(serial=None, timeout=table.timeout)
     probe = meter_far_end(
         world.plant,
         row,
@@ -162,7 +162,8 @@ def serial_voltage_source(table: VoltageSourceSpec, world: World) -> SourceMeter
     from sim_backend.serial_line.wires import plug_in
     from sim_backend.voltage_source import LoadFault, voltage_far_end
 
-    row, clock = voltage_dialect(table.dialect), world.clock
+    row = voltage_dialect(table.dialect).of_one(serial=None, timeout=table.timeout)
+    clock = world.clock
     given = world.faults.get("voltage_source", ())
     source = voltage_far_end(
         world.plant, table.name, row, clock, seed=world.simulated.seed

@@ -33,6 +33,9 @@ SAMPLES_PER_NODE_A = 50
 LOOSE = r"(?i)/dev/(tty(USB|ACM)|cu\.usb)|COM\d"
 """Ports whose names are given in the order of plugging in."""
 
+NAME = 40
+"""Characters of an instrument's answer to *IDN?, about the longest of its answers."""
+
 FINE = 0.01
 """Largest part of the expected field that one code of its channel should be."""
 
@@ -51,6 +54,7 @@ def warnings(scene: Scene, needed: Needs, drive: Timeline) -> tuple[str, ...]:
         *_field(scene, needed, drive),
         *(() if scene.bench.simulated else _magnet(scene)),
         *_exchanged(scene, needed),
+        *_slow_links(scene, needed),
     )
 
 
@@ -75,17 +79,40 @@ def _ways(scene: Scene, drive: Timeline) -> Iterator[str]:
             )
 
 
+def _opened(needed: Needs) -> set[str]:
+    """Names of the tables of instruments behind a port that a run opens."""
+    asked = {
+        "coil": needed.coil,
+        "field_meter": needed.field_meter,
+        "thermometer": needed.thermometer,
+    }
+    sources = (f"voltage_source.{name}" for name in needed.voltages)
+    return {*(name for name, opens in asked.items() if opens), *sources}
+
+
+def _slow_links(scene: Scene, needed: Needs) -> Iterator[str]:
+    """Instruments whose name takes longer on the wire than is waited for it."""
+    opened = _opened(needed)
+    for name, spec in scene.bench.wired_by_port.items():
+        if name not in opened or spec.driver != "serial":
+            continue
+        wire = load_dialect(spec.dialect).serial.at(spec.baud)
+        waits, takes = spec.timeout or wire.timeout, NAME * wire.character_time
+        if takes > waits:
+            yield (
+                f"[{name}] {wire.baud} baud: {NAME} characters, as an instrument's "
+                f"name has, take {show(takes, 's', 2)}, and {show(waits, 's', 2)} are "
+                f'waited for an answer. Write timeout = "{2 * takes:.1g} s" there, or '
+                "use a faster link."
+            )
+
+
 def _exchanged(scene: Scene, needed: Needs) -> Iterator[str]:
     """Instruments that would take each other's place if their ports' names changed."""
     bench = scene.bench
     if bench.simulated:
         return
-    opened = {
-        "coil": needed.coil,
-        "field_meter": needed.field_meter,
-        "thermometer": needed.thermometer,
-        **dict.fromkeys((f"voltage_source.{name}" for name in needed.voltages), True),
-    }
+    opened = _opened(needed)
     alike: dict[str, list[str]] = {}
     for name, spec in bench.wired_by_port.items():
         if spec.driver == "serial":
@@ -93,7 +120,7 @@ def _exchanged(scene: Scene, needed: Needs) -> Iterator[str]:
     for names in alike.values():
         found = [(name, bench.wired_by_port[name]) for name in names]
         bare = any(
-            opened.get(name) and not spec.serial and re.match(LOOSE, spec.port)
+            name in opened and not spec.serial and re.match(LOOSE, spec.port)
             for name, spec in found
         )
         if len(names) > 1 and bare:

@@ -375,3 +375,12 @@ def test_steps_that_no_shunt_shows_are_dated_by_the_answer_of_the_source(run_sce
     by_answer, by_shunt = found
     assert by_answer.shape == by_shunt.shape
     assert np.abs(by_answer - by_shunt)[1:, 0].max() < 1e-3
+
+
+def test_the_simulated_source_is_waited_for_as_long_as_the_bench_file_says(run_scene):
+    """At 1200 baud its name takes 0.33 s; 0.2 s were waited, whatever timeout said."""
+    slow = "bench.coil.baud=1200", "record.sample_rate=50 kS/s", "protocol.hold=0.6 s"
+    levels = 'protocol.levels=["100 mN"]'
+    assert run_scene(*slow, levels).done.state is RunState.FAULTED
+    patient = run_scene(*slow, levels, "bench.coil.timeout=0.7 s")
+    assert patient.done.state is RunState.COMPLETE, patient.done.reason

@@ -502,6 +502,16 @@ def test_a_drain_current_keeps_the_v_c1_that_it_is_derived_from():
         assert less.needs.stored == ("V_C2",)
 
 
+def test_a_link_too_slow_for_an_instrument_s_name_is_warned_of():
+    """A plan at 1200 baud had no doubt, and the run ended as it opened the source."""
+    slow = "bench.coil.baud=1200"
+    told = " ".join(plan(load("demo", [slow])).warnings)
+    assert "[coil] 1200 baud: 40 characters" in told and "330 ms" in told
+    patient = " ".join(plan(load("demo", [slow, "bench.coil.timeout=0.7 s"])).warnings)
+    quicker = " ".join(plan(load("demo", ["bench.coil.baud=2400"])).warnings)
+    assert "characters" not in patient + quicker
+
+
 def test_hum_that_cuts_a_signal_off_is_planned_for(fixed_ranges):
     """The plan knew of 60 mV; the run had V_C1 cut off, and refused its gains."""
     loud = ["simulated.hum=60 mV", "protocol.count=2", "protocol.lowest=0.3 Hz"]
