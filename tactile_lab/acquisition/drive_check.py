@@ -13,6 +13,7 @@ the last, where a lag counts little; of the field over all such trials so far.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 
 import numpy as np
@@ -88,12 +89,15 @@ class DriveCheck:
         """
         if trial.hold is None:
             return []
-        begin, end = trial.hold[0] + SETTLING, trial.hold[1]
+        come = max(trial.hold[0], float(current[0, 0])) if len(current) else math.inf
+        begin, end = come + SETTLING, trial.hold[1]
         found = []
         if asked is not None:
             found.append(("asked", _held(asked, current, trial.hold)))
-        held = current[(current[:, 0] >= begin) & (current[:, 0] <= end)]
-        steady = _steady(held[:, 1])
+        # what flows as it begins was set before: a slow source may set it only then
+        first = max(int(np.searchsorted(current[:, 0], begin, side="right")) - 1, 0)
+        held = current[first : np.searchsorted(current[:, 0], end, side="right")]
+        steady = begin < end and _steady(held[:, 1])
         if not steady:
             begin, end = _moving(current, trial.length)
             held = current[(current[:, 0] >= begin) & (current[:, 0] <= end)]
@@ -129,8 +133,7 @@ class DriveCheck:
         seen = shunt(begin, end)
         if seen is not None:
             since, mean = seen
-            amperes = float(np.interp(np.linspace(since, end, GRID), *held.T).mean())
-            found.append(("shunt", _shunt(amperes, mean)))
+            found.append(("shunt", _shunt(_mean(held, since, end), mean)))
         return found
 
     def _field(self, pairs: list[tuple[FloatArray, float]]) -> str:
@@ -155,6 +158,16 @@ class DriveCheck:
 def _steady(amperes: FloatArray) -> bool:
     """Whether a current, shape (n,), hardly changes; not where nothing is known."""
     return bool(amperes.size and np.ptp(amperes) <= STEADY * np.abs(amperes).max())
+
+
+def _mean(current: FloatArray, begin: float, end: float) -> float:
+    """Of a current, shape (n, 2), s and A, from s to s: it stays as set until the next.
+
+    A straight line from one to the next is another current where they are far apart.
+    """
+    times = np.linspace(begin, end, GRID)
+    at = np.searchsorted(current[:, 0], times, side="right") - 1
+    return float(current[np.maximum(at, 0), 1].mean())
 
 
 def _held(asked: Waveform, current: FloatArray, hold: tuple[float, float]) -> str:

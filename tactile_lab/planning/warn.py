@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from tactile_lab.analysis.noise import MAINS
 from tactile_lab.instruments.dialects import load_dialect
 from tactile_lab.instruments.registry import scope_capability
+from tactile_lab.instruments.serial_dialect import SerialDialect
 from tactile_lab.magnetics import A2_PRINTED
 from tactile_lab.planning.clocks import clocks
 from tactile_lab.planning.computing import Computing
@@ -96,7 +97,10 @@ def _slow_links(scene: Scene, needed: Needs) -> Iterator[str]:
     for name, spec in scene.bench.wired_by_port.items():
         if name not in opened or spec.driver != "serial":
             continue
-        wire = load_dialect(spec.dialect).serial.at(spec.baud)
+        row = load_dialect(spec.dialect)
+        if not isinstance(row, SerialDialect):
+            continue
+        wire = row.serial.at(spec.baud)
         waits, takes = spec.timeout or wire.timeout, NAME * wire.character_time
         if takes > waits:
             yield (
