@@ -29,8 +29,8 @@ ALWAYS = ("spike_count", "first_spike", "mean_rate")
 """Kept unless the study says what."""
 SEED = "simulated.seed"
 """Each repeat has its own, at every point the same ones."""
-MODELLED = ("sensor", "protocol")
-"""Tables that say all there is of a circuit alone and of the force asked for."""
+MODELLED = ("sensor.", "protocol.", "bench.followers.")
+"""What says all there is of a circuit, its followers with it, and of the force."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,7 +231,7 @@ def _study(data: dict[str, Any], name: str, folder: Path, origin: str) -> Study:
     keeping = kept(table.keep, folder, table.on)
     if table.on == "model" and not any(one.uses_scene for one in keeping):
         for asked in table.axis:
-            if asked.key.partition(".")[0] not in MODELLED:
+            if asked.key != "bench" and not asked.key.startswith(MODELLED):
                 raise SceneError(
                     f"{origin}: axis {asked.key} moves nothing of a circuit alone; "
                     'leave it out, or say on = "simulated".'

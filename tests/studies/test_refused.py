@@ -85,3 +85,9 @@ def test_a_study_that_is_not_there_is_named_with_those_that_are() -> None:
 def test_what_only_the_scene_knows_may_vary_where_it_is_asked_for() -> None:
     keep = {"lag": "scene.bench.magnet.eddy_lag"}
     assert load_study({**SHORT, "axis": [LAGS], "keep": keep}).design.size == 2
+
+
+def test_followers_of_a_bench_draw_a_current_of_the_circuit_alone_too() -> None:
+    """0 and 1 nA give 36 and 56 spikes in `hold_10s`."""
+    biases = {"key": "bench.followers.input_bias", "values": ["0 A", "1 nA"]}
+    assert load_study({**SHORT, "axis": [biases]}).design.size == 2
