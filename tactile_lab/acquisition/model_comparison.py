@@ -19,11 +19,16 @@ class ModelComparison:
 
     Each set-point is taken to act as the source begins to answer, and how far that may
     be off is said; the report puts it where the shunt saw it.
+
+    Args:
+        scene: that is run.
+        searched: whether spikes are looked for.
+        counted: whether each spike is found; else a count is of those that were seen.
     """
 
-    def __init__(self, scene: Scene, *, searched: bool) -> None:
+    def __init__(self, scene: Scene, *, searched: bool, counted: bool = True) -> None:
         self._model: LiveModel | None = LiveModel.of(scene)
-        self._searched = searched
+        self._searched, self._counted = searched, counted
         self._doubt = 0.0
         self._model.until(0.0)  # compiles, before the coil waits for anything
 
@@ -72,7 +77,8 @@ class ModelComparison:
         start, length = outcome.start, outcome.trial.length
         mine = spikes[(spikes >= start) & (spikes < start + length)] - start
         count = outcome.spike_times.size
-        text = f"{count} spike{'' if count == 1 else 's'} (model {mine.size})"
+        seen = "" if self._counted else " seen, not all"
+        text = f"{count} spike{'' if count == 1 else 's'}{seen} (model {mine.size})"
         offsets = match(outcome.spike_times, mine).offsets
         if offsets.size:
             text += f", {show(float(np.median(offsets)), 's', 2, '+')} (median"

@@ -58,7 +58,9 @@ class Narrator:
         if execution.scene.compared and (searched or stored):
             from tactile_lab.acquisition.model_comparison import ModelComparison
 
-            self._model = ModelComparison(execution.scene, searched=searched)
+            self._model = ModelComparison(
+                execution.scene, searched=searched, counted=self._counted
+            )
 
     def __call__(self, event: Event) -> None:
         """Take an event of the run."""

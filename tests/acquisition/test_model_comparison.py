@@ -102,3 +102,11 @@ def test_slices_of_any_size_give_the_same_model(ahead):
         seen.append(parts.until(end).spike_times)
     assert np.concatenate(seen) == pytest.approx(expected, abs=3e-5)
     assert parts.reached == 3.0
+
+
+def test_spikes_that_fall_between_two_samples_are_no_count():
+    """At 1 kS/s "0 spikes (model 15)" read as a sensor that does not fire."""
+    beside = ModelComparison(SCENE, searched=True, counted=False)
+    follow(beside)
+    told = beside.ended(outcome(Circuit()))
+    assert re.search(r"\d+ spikes seen, not all \(model \d+\)", told)
