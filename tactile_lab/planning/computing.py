@@ -29,7 +29,7 @@ scenes took in the mean, nothing else running, sets it. The seconds are fitted t
 each scene took, and to what the demo took less without the model beside it."""
 ROUNDS = 60
 
-START, FITTED = 3.0, 0.38
+START, FITTED = 3.0, 0.9
 """Imports, opening of all instruments, figures and report; and what the lanes of spikes
 and the fits to them add where any are expected, s."""
 PER_TRIAL = 0.0054
