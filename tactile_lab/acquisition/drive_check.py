@@ -133,7 +133,9 @@ class DriveCheck:
         seen = shunt(begin, end)
         if seen is not None:
             since, mean = seen
-            found.append(("shunt", _shunt(_mean(held, since, end), mean)))
+            # as set until the next: between two far apart flows no straight line
+            set_to = Waveform.stairs(held, end).mean(np.array([since]), end - since)
+            found.append(("shunt", _shunt(float(set_to[0]), mean)))
         return found
 
     def _field(self, pairs: list[tuple[FloatArray, float]]) -> str:
@@ -158,16 +160,6 @@ class DriveCheck:
 def _steady(amperes: FloatArray) -> bool:
     """Whether a current, shape (n,), hardly changes; not where nothing is known."""
     return bool(amperes.size and np.ptp(amperes) <= STEADY * np.abs(amperes).max())
-
-
-def _mean(current: FloatArray, begin: float, end: float) -> float:
-    """Of a current, shape (n, 2), s and A, from s to s: it stays as set until the next.
-
-    A straight line from one to the next is another current where they are far apart.
-    """
-    times = np.linspace(begin, end, GRID)
-    at = np.searchsorted(current[:, 0], times, side="right") - 1
-    return float(current[np.maximum(at, 0), 1].mean())
 
 
 def _held(asked: Waveform, current: FloatArray, hold: tuple[float, float]) -> str:
