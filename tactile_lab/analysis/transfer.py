@@ -92,23 +92,22 @@ def fit_transfer(
         )
     if not (np.all(np.isfinite(volts)) and np.all(np.isfinite(amperes))):
         raise ParameterError("A transfer curve must hold finite numbers only.")
-    use = amperes > 0
     if between is not None:
         between = min(between), max(between)
-        use &= (volts >= between[0]) & (volts <= between[1])
-    elif use.any():
-        floor = amperes[use].min()
+    low, high = between or (-math.inf, SUBTHRESHOLD_END)
+    inside, positive = (volts >= low) & (volts <= high), amperes > 0
+    use = inside & positive
+    if between is None and positive.any():
+        floor = amperes[positive].min()
         bent = amperes < ABOVE_FLOOR * floor
         # a curve without a leakage floor starts on its line: keep its first points
-        use &= (volts <= SUBTHRESHOLD_END) & ~(bent & _flat(volts, amperes, floor))
+        use &= ~(bent & _flat(volts, amperes, floor))
     x, y = volts[use], np.log(amperes[use])
     if x.size < FEWEST:
         raise NotIdentifiableError(_too_few(int(x.size), volts, between))
     line = Line.through(x, y) if np.ptp(x) > 0 else None
     leakage = None
     if line is not None and line.slope.value > 0:
-        low, high = (-math.inf, SUBTHRESHOLD_END) if between is None else between
-        inside = (volts >= low) & (volts <= high)
         x = volts[inside]
         found = _weighed(x, amperes[inside], line, leaks=between is None)
         line = found.line
