@@ -246,7 +246,7 @@ def table(stack: LaneStack, title: str) -> str:
         names = (f"run{number} {one.name}" for number, one in enumerate(members, 1))
         title = "; ".join([title, *names])
     lines = [f"# {title}; SI units", ",".join(name for name, _ in columns)]
-    # as numbers of Python's own: numpy's take three times as long to print
+    # as numbers of Python's own: numpy's take twice as long to print
     cells = [[f"{x:.9g}" for x in values.tolist()] for _, values in columns]
     lines += map(",".join, zip_longest(*cells, fillvalue=""))
     return "\n".join(lines) + "\n"
